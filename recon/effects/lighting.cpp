@@ -28,7 +28,7 @@ Status check(const Lighting& lighting) {
     return Error{ErrorKind::bad_input, what, "light", "Reconstruct it again"};
   };
   if (lighting.light.source == Light::Source::found) return refuse("the light isn't known");
-  constexpr double kMost = 1e30;  // far below the largest float; also excludes infinity
+  constexpr double kMost = 1e12;  // its products are floats; also excludes infinity
   for (const auto& colour : {lighting.light.strength, lighting.light.ambient})
     for (const double level : colour)
       if (!(level >= 0 && level <= kMost)) return refuse("the light's colours must be 0 or more");
@@ -48,12 +48,12 @@ std::string words(const Light& light) {
   const std::string ambient = levels(light.ambient);
   if (light.source == Source::even) return fmt::format("even: {} grey levels from all sides", ambient);
   const std::string strength = levels(light.strength);
-  const std::string from = light.source == Source::distant
-                               ? fmt::format("distant, from the direction {}: {} grey levels",
-                                             place_of(light), strength)
-                               : fmt::format("nearby, from {} m: {} grey levels at a metre", place_of(light),
-                                             strength);
-  return fmt::format("{}, and {} from all sides", from, ambient);
+  const std::string from =
+      light.source == Source::distant
+          ? fmt::format("distant, from the direction {}: {} grey levels", place_of(light), strength)
+          : fmt::format("nearby, from {} m: {} grey levels at a metre", place_of(light), strength);
+  const bool from_all_sides = light.ambient != std::array<double, 3>{};
+  return from_all_sides ? fmt::format("{}, and {} from all sides", from, ambient) : from;
 }
 
 }  // namespace emberlock::recon

@@ -2,7 +2,6 @@
 #include "recon/pipeline/shown_volume.h"
 
 #include <algorithm>
-#include <array>
 
 #include "recon/export/preview.h"
 #include "recon/export/volume_file.h"
@@ -60,11 +59,16 @@ Hull filled_voxels(const Volume& volume) {
   return medium;
 }
 
-/// Grey levels of a light where nothing shades it; of one nearby, at a place.
-std::array<double, 3> unshaded(const Light& light, double squared_meters) {
-  std::array<double, 3> colour = light.ambient;
-  for (std::size_t c = 0; c < 3; ++c) colour[c] += light.strength[c] / squared_meters;
-  return colour;
+Eigen::Vector3d from_middle(const Light& light, const Box& box) {
+  return Eigen::Vector3d(light.place[0], light.place[1], light.place[2]) - box.center;
+}
+
+/// What a light's strength is divided by in the middle of the grid, squared metres; one nearby is never taken
+/// for nearer than a voxel's edge, as in light_that_reaches().
+double spread_in_the_middle(const Light& light, const Grid& grid) {
+  if (light.source != Light::Source::nearby) return 1;
+  const auto edge = static_cast<double>(grid.edge);
+  return std::max(from_middle(light, box_of(grid)).squaredNorm(), edge * edge);
 }
 
 }  // namespace
@@ -98,21 +102,20 @@ Status relight(ShownVolume& shown, Light light, const ComputeOptions& compute) {
   if (light.source == Source::found)
     return Error{ErrorKind::bad_input, "a light to be found needs pictures", "light",
                  "Give none, even, distant or nearby"};
-  const Box box = box_of(shown.volume.grid);
-  const auto from_middle = [&](const Light& of) -> Eigen::Vector3d {
-    return Eigen::Vector3d(of.place[0], of.place[1], of.place[2]) - box.center;
-  };
-  const auto squared_meters = [&](const Light& of) {
-    return of.source == Source::nearby ? from_middle(of).squaredNorm() : 1;
-  };
-  if (light.source == Source::nearby && (from_middle(light).array().abs() <= box.size.array() / 2).all())
+  const Grid& grid = shown.volume.grid;
+  const Box box = box_of(grid);
+  constexpr double kHalf = 0.5 * (1 + 1e-5);  // the grid's places are rounded
+  if (light.source == Source::nearby &&
+      (from_middle(light, box).array().abs() <= kHalf * box.size.array()).all())
     return Error{ErrorKind::bad_input, "the nearby light stands inside of the box around the medium", "light",
                  "Give a place outside of it"};
-  const std::array<double, 3> colour = unshaded(filmed, squared_meters(filmed));
   light.ambient = light.strength = {};
-  if (light.source == Source::even) light.ambient = colour;
-  if (light.source == Source::distant || light.source == Source::nearby)
-    for (std::size_t c = 0; c < 3; ++c) light.strength[c] = squared_meters(light) * colour[c];
+  for (std::size_t c = 0; c < 3; ++c) {
+    const double unshaded = filmed.ambient[c] + filmed.strength[c] / spread_in_the_middle(filmed, grid);
+    if (light.source == Source::even) light.ambient[c] = unshaded;
+    if (light.source == Source::distant || light.source == Source::nearby)
+      light.strength[c] = spread_in_the_middle(light, grid) * unshaded;
+  }
   Pool pool(compute.threads);
   shown.volume.emission = lit_emission(shown.volume, light, pool);
   shown.lighting.light = light;
@@ -127,7 +130,7 @@ LightViews::LightViews(Volume volume, const Scattering& scattering, const Comput
       medium_(whole_grid(volume_.grid)) {
   if (dark_.extinction.empty()) return;
   dark_.emission.resize(volume_.emission.size());
-  if (scattering.order == Scattering::Order::none) return;
+  if (scattering.order == Scattering::Order::none || scattering.albedo <= 0) return;
   effects_.scattering = scattering;
   medium_ = filled_voxels(volume_);
   Pool pool(compute_);

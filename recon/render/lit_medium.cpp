@@ -63,7 +63,8 @@ class Reach {
 
 std::vector<float> light_that_reaches(const std::vector<Rgba>& medium, const Grid& grid, const Light& light,
                                       Pool& pool) {
-  if (light.source == Light::Source::even) return std::vector<float>(grid.size(), 1.F);
+  if (light.source != Light::Source::distant && light.source != Light::Source::nearby)
+    return std::vector<float>(grid.size(), 1.F);
   std::vector<Rgba> dark(grid.size());
   for (std::size_t p = 0; p < dark.size(); ++p) dark[p].c[3] = medium[p].c[3];
   const int every = std::max(1, (std::max({grid.nx, grid.ny, grid.nz}) - 1 + kMostPlaces - 1) / kMostPlaces);

@@ -12,9 +12,10 @@
 namespace emberlock::recon {
 
 /// What reaches each key point of a light from outside: exp(-depth towards it), over the squared distance in
-/// metres where it is nearby; 1 of one that shines evenly. Lane 3 of `medium` is the extinction a voxel edge.
-/// The medium ends with the grid. Light is smooth where its medium isn't: it is computed at every n-th key
-/// point, of which there are at most 49 along the longest side, and is trilinear between them.
+/// metres where it is nearby; 1 of one that shines evenly, or not at all. Lane 3 of `medium` is the
+/// extinction a voxel edge. The medium ends with the grid. Light is smooth where its medium isn't: it is
+/// computed at every n-th key point, of which there are at most 49 along the longest side, and is trilinear
+/// between them.
 std::vector<float> light_that_reaches(const std::vector<Rgba>& medium, const Grid& grid, const Light& light,
                                       Pool& pool);
 

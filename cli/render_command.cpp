@@ -316,7 +316,7 @@ Result<recon::ShownVolume> shown_volume(const RenderArguments& a, const recon::C
 }
 
 /// What the pictures show beside what the volume emits and absorbs.
-void print(const recon::Lighting& lighting) {
+void print_lighting(const recon::Lighting& lighting) {
   for (const auto& [name, words] :
        {std::pair("scattering", words(lighting.scattering)), {"light", words(lighting.light)}})
     if (!words.empty()) std::printf("%-16s %s\n", name, words.c_str());
@@ -347,8 +347,9 @@ Status render(const RenderArguments& a, const CLI::App& verb) try {
   const recon::BarEnds ends = recon::kelvin_bar(middle.low, middle.high);
   EMBERLOCK_ASSIGN_OR_RETURN(OutputFolder folder, OutputFolder::create(request));
   EMBERLOCK_ASSIGN_OR_RETURN(FrameFiles files, FrameFiles::create(a, folder.path(), size));
+  const recon::Lighting lighting = shown.lighting;
   const RenderSome render_some =
-      a.kelvin() ? temperatures(a, shown, path, ends, compute) : colours(a, shown, compute);
+      a.kelvin() ? temperatures(a, shown, path, ends, compute) : colours(a, std::move(shown), compute);
   EMBERLOCK_RETURN_IF_ERROR(render_all(a, render_some, path, files));
   EMBERLOCK_RETURN_IF_ERROR(folder.commit());
   std::printf("%-16s %zu of %d x %d\n", "frames", path.size(), size.width, size.height);
@@ -356,7 +357,7 @@ Status render(const RenderArguments& a, const CLI::App& verb) try {
     std::printf("%-16s %.0f K is dark, %.0f K bright (inferno); black tells nothing\n", "colours", ends.low,
                 ends.high);
   else
-    print(shown.lighting);
+    print_lighting(lighting);
   std::printf("%-16s %s\n", "written to", a.out.c_str());
   return {};
 } catch (const recon::DeviceError& e) {

@@ -94,7 +94,9 @@ Error lacks_grid(const std::string& name, const recon::SharedVolume& volume, con
 Result<recon::SharedVolume> shared_volume(const ExportArguments& a, const ResultVolume& from, float white,
                                           const std::string& program) {
   EMBERLOCK_ASSIGN_OR_RETURN(recon::SharedVolume volume, recon::read_shared_volume(from.file));
-  volume.provenance = {program, reported(from.file, "input"), reported(from.file, "up"), from.frame};
+  EMBERLOCK_ASSIGN_OR_RETURN(const recon::Lighting lighting, recon::read_lighting(from.file));
+  volume.provenance = {program, reported(from.file, "input"), reported(from.file, "up"), from.frame,
+                       lighting};
   if (white > 0) recon::add_flame(volume, white);
   if (a.format == "vti") recon::add_told(volume);
   for (const std::string& name : a.grids)

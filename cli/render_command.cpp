@@ -23,6 +23,7 @@
 #include "cli/result_files.h"
 #include "cli/up_axis.h"
 #include "recon/calibrate/camera_path.h"
+#include "recon/effects/lighting.h"
 #include "recon/export/exr_file.h"
 #include "recon/export/picture.h"
 #include "recon/export/preview.h"
@@ -45,6 +46,7 @@ struct RenderArguments {
   std::string up;
   std::string image = "640x480";
   std::string quantity = "colour";
+  std::string light;
   std::string format = "png";
   int frames = 96;
   double elevation_degrees = 10;
@@ -216,9 +218,9 @@ class FrameFiles {
 /// Renders some cameras' pictures into their files.
 using RenderSome = std::function<Status(const std::vector<const recon::CameraModel*>&, FrameFiles&)>;
 
-RenderSome colours(const RenderArguments& a, recon::Volume volume, const recon::ComputeOptions& compute) {
-  return [&a, views = recon::LightViews(std::move(volume), compute)](const auto& cameras,
-                                                                     FrameFiles& files) -> Status {
+RenderSome colours(const RenderArguments& a, recon::ShownVolume shown, const recon::ComputeOptions& compute) {
+  return [&a, views = recon::LightViews(std::move(shown.volume), shown.lighting.scattering, compute)](
+             const auto& cameras, FrameFiles& files) -> Status {
     for (recon::ShownView& view : views.of(cameras)) {
       for (float& v : view.light.rgb) v *= static_cast<float>(a.brightness);
       EMBERLOCK_RETURN_IF_ERROR(a.format == "exr" ? files.put_exr(view)
@@ -268,15 +270,12 @@ Status check_used(const RenderArguments& a, const CLI::App& verb) {
   const bool one = !a.camera.empty();
   const bool along = !one && a.path == "cameras";
   const bool around = !one && !along;
-  const std::pair<const char*, bool> used[] = {{"--frames", !one},
-                                               {"--elevation", around},
-                                               {"--distance", around},
-                                               {"--up", !along},
-                                               {"--input", along},
-                                               {"--rig", along},
-                                               {"--rate", a.video()},
-                                               {"--brightness", !a.kelvin()},
-                                               {"--transparent", a.format == "png"}};
+  const std::pair<const char*, bool> used[] = {
+      {"--frames", !one},       {"--elevation", around},
+      {"--distance", around},   {"--up", !along},
+      {"--input", along},       {"--rig", along},
+      {"--rate", a.video()},    {"--brightness", !a.kelvin()},
+      {"--light", !a.kelvin()}, {"--transparent", a.format == "png"}};
   for (const auto& [name, applies] : used)
     if (!applies && verb.count(name) > 0)
       return Error{ErrorKind::bad_input, "changes nothing here", name, "Leave it away"};
@@ -303,6 +302,26 @@ Status check(const RenderArguments& a, ImageSize size) {
   return {};
 }
 
+/// The result in the light that is asked for.
+Result<recon::ShownVolume> shown_volume(const RenderArguments& a, const recon::ComputeOptions& compute) {
+  EMBERLOCK_ASSIGN_OR_RETURN(recon::ShownVolume shown, recon::read_shown_volume(a.result));
+  if (a.light.empty()) return shown;
+  const auto asked = recon::parse_effects("light=" + a.light);
+  if (!asked || a.light.find(',') != std::string::npos)
+    return Error{ErrorKind::bad_input, "can't read \"" + a.light + '"', "--light",
+                 "Give none, even, distant:x=X:y=Y:z=Z (towards it) or nearby:x=X:y=Y:z=Z (m)"};
+  const Status relit = recon::relight(shown, asked->fixed->light, compute);
+  if (!relit.ok()) return Error{relit.error().kind, relit.error().what, "--light", relit.error().remedy};
+  return shown;
+}
+
+/// What the pictures show beside what the volume emits and absorbs.
+void print_lighting(const recon::Lighting& lighting) {
+  for (const auto& [name, words] :
+       {std::pair("scattering", words(lighting.scattering)), {"light", words(lighting.light)}})
+    if (!words.empty()) std::printf("%-16s %s\n", name, words.c_str());
+}
+
 Status render(const RenderArguments& a, const CLI::App& verb) try {
   EMBERLOCK_ASSIGN_OR_RETURN(const ImageSize size, parse_image_size(a.image));
   EMBERLOCK_RETURN_IF_ERROR(check_used(a, verb));
@@ -311,7 +330,7 @@ Status render(const RenderArguments& a, const CLI::App& verb) try {
   EMBERLOCK_ASSIGN_OR_RETURN(compute.device, recon::parse_device(a.device));
   EMBERLOCK_ASSIGN_OR_RETURN(compute.device, recon::resolve(compute.device));
   compute.threads = a.threads;
-  EMBERLOCK_ASSIGN_OR_RETURN(recon::ShownVolume shown, recon::read_shown_volume(a.result));
+  EMBERLOCK_ASSIGN_OR_RETURN(recon::ShownVolume shown, shown_volume(a, compute));
   const bool told = std::any_of(shown.kelvin.begin(), shown.kelvin.end(), [](float t) { return t > 0; });
   if (a.kelvin() && !told)
     return Error{ErrorKind::bad_input, "tells no temperature", a.result,
@@ -328,14 +347,17 @@ Status render(const RenderArguments& a, const CLI::App& verb) try {
   const recon::BarEnds ends = recon::kelvin_bar(middle.low, middle.high);
   EMBERLOCK_ASSIGN_OR_RETURN(OutputFolder folder, OutputFolder::create(request));
   EMBERLOCK_ASSIGN_OR_RETURN(FrameFiles files, FrameFiles::create(a, folder.path(), size));
+  const recon::Lighting lighting = shown.lighting;
   const RenderSome render_some =
-      a.kelvin() ? temperatures(a, shown, path, ends, compute) : colours(a, std::move(shown.volume), compute);
+      a.kelvin() ? temperatures(a, shown, path, ends, compute) : colours(a, std::move(shown), compute);
   EMBERLOCK_RETURN_IF_ERROR(render_all(a, render_some, path, files));
   EMBERLOCK_RETURN_IF_ERROR(folder.commit());
   std::printf("%-16s %zu of %d x %d\n", "frames", path.size(), size.width, size.height);
   if (a.kelvin())
     std::printf("%-16s %.0f K is dark, %.0f K bright (inferno); black tells nothing\n", "colours", ends.low,
                 ends.high);
+  else
+    print_lighting(lighting);
   std::printf("%-16s %s\n", "written to", a.out.c_str());
   return {};
 } catch (const recon::DeviceError& e) {
@@ -390,6 +412,10 @@ void add_render(CLI::App& app) {
           "in Matroska")
       ->check(CLI::IsMember({"png", "exr", "mp4", "ffv1"}))
       ->capture_default_str();
+  verb->add_option("--light", a.light,
+                   "Of a result of --effects light=...: another light in that one's place, as bright: none, "
+                   "even, distant:x=X:y=Y:z=Z (towards it) or nearby:x=X:y=Y:z=Z (m)")
+      ->type_name("TEXT");
   verb->add_flag("--transparent", a.transparent, "PNG before nothing instead of black; EXR always is");
   verb->add_option("--brightness", a.brightness, "Factor of the colours")->capture_default_str();
   verb->add_option("--rate", a.rate, "Of a video, frames a second")->capture_default_str();

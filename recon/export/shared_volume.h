@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "base/result.h"
+#include "recon/effects/lighting.h"
 #include "recon/kernels/grid.h"
 
 // A volume as other programs open it: the grids of its volume.vdb with the names and units that they have
@@ -29,6 +30,7 @@ struct Provenance {
   std::string input;    ///< what was reconstructed
   std::string up;       ///< the world's axis that points up: "z", "-y"
   std::optional<std::uint64_t> frame;
+  Lighting lighting = {};  ///< what its medium scatters
 };
 
 struct SharedVolume {

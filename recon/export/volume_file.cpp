@@ -3,6 +3,7 @@
 #include "recon/export/volume_file.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdint>
 #include <fstream>
@@ -10,6 +11,7 @@
 #include <new>
 #include <string>
 #include <string_view>
+#include <utility>
 
 #pragma GCC diagnostic push
 #pragma GCC diagnostic ignored "-Wconversion"
@@ -190,9 +192,85 @@ std::vector<float> without_traces(std::vector<float> extinction, const Grid& gri
   return extinction;
 }
 
+constexpr const char* kScattering = "emberlock_scattering";
+constexpr const char* kAlbedo = "emberlock_albedo";
+constexpr const char* kAsymmetry = "emberlock_asymmetry";
+constexpr const char* kLight = "emberlock_light";
+constexpr const char* kLightPlace = "emberlock_light_place";
+constexpr const char* kLightStrength = "emberlock_light_strength";
+constexpr const char* kLightAmbient = "emberlock_light_ambient";
+
+constexpr std::pair<std::string_view, Scattering::Order> kOrders[] = {
+    {"single", Scattering::Order::single}, {"multiple", Scattering::Order::multiple}};
+constexpr std::pair<std::string_view, Light::Source> kSources[] = {
+    {"even", Light::Source::even}, {"distant", Light::Source::distant}, {"nearby", Light::Source::nearby}};
+
+/// What a medium scatters, as metadata: nothing of what is off.
+openvdb::MetaMap metadata_of(const Lighting& lighting) {
+  openvdb::MetaMap about;
+  for (const auto& [word, order] : kOrders) {
+    if (lighting.scattering.order != order) continue;
+    about.insertMeta(kScattering, openvdb::StringMetadata(std::string(word)));
+    about.insertMeta(kAlbedo, openvdb::DoubleMetadata(lighting.scattering.albedo));
+    about.insertMeta(kAsymmetry, openvdb::DoubleMetadata(lighting.scattering.asymmetry));
+  }
+  const Light& light = lighting.light;
+  const auto insert = [&](const char* key, const std::array<double, 3>& v) {
+    about.insertMeta(key, openvdb::Vec3DMetadata({v[0], v[1], v[2]}));
+  };
+  for (const auto& [word, source] : kSources) {
+    if (light.source != source) continue;
+    about.insertMeta(kLight, openvdb::StringMetadata(std::string(word)));
+    insert(kLightPlace, light.place);
+    insert(kLightStrength, light.strength);
+    insert(kLightAmbient, light.ambient);
+  }
+  return about;
+}
+
+/// Metadata of a file that foreign hands may have made. The first that can't be read is an Error, and the
+/// values from there on are nothing.
+class ReadMetadata {
+ public:
+  ReadMetadata(const openvdb::MetaMap& from, const std::filesystem::path& path) : from_(from), path_(path) {}
+
+  [[nodiscard]] bool has(const char* key) const { return from_[key] != nullptr; }
+  double number(const char* key) {
+    const auto found = from_.getMetadata<openvdb::DoubleMetadata>(key);
+    if (!found) refuse(key, "is missing or no number");
+    return found ? found->value() : 0;
+  }
+  std::array<double, 3> three(const char* key) {
+    const auto found = from_.getMetadata<openvdb::Vec3DMetadata>(key);
+    if (!found) refuse(key, "is missing or not three numbers");
+    if (!found) return {};
+    const openvdb::Vec3d v = found->value();
+    return {v[0], v[1], v[2]};
+  }
+  /// What a word of the table stands for.
+  template <class Value, std::size_t kSize>
+  Value one_of(const std::pair<std::string_view, Value> (&table)[kSize], const char* key) {
+    const auto found = from_.getMetadata<openvdb::StringMetadata>(key);
+    for (const auto& [word, value] : table)
+      if (found && found->value() == word) return value;
+    refuse(key, "is no word that is known");
+    return Value{};
+  }
+  [[nodiscard]] const Status& status() const { return status_; }
+
+ private:
+  void refuse(const char* key, const char* what) {
+    if (status_.ok()) status_ = damaged(path_, std::string(key) + ' ' + what);
+  }
+
+  const openvdb::MetaMap& from_;
+  const std::filesystem::path& path_;
+  Status status_;
+};
+
 /// Where a volume comes from, as metadata.
 openvdb::MetaMap metadata_of(const Provenance& from) {
-  openvdb::MetaMap about;
+  openvdb::MetaMap about = metadata_of(from.lighting);
   const auto insert = [&](const char* key, const std::string& text) {
     if (!text.empty()) about.insertMeta(key, openvdb::StringMetadata(text));
   };
@@ -207,7 +285,7 @@ openvdb::MetaMap metadata_of(const Provenance& from) {
 }  // namespace
 
 Status write_volume(const Volume& volume, const std::filesystem::path& path,
-                    const std::vector<NamedGrid>& further) {
+                    const std::vector<NamedGrid>& further, const Lighting& lighting) {
   openvdb::initialize();
   EMBERLOCK_RETURN_IF_ERROR(check_size(volume.grid, path));
   const auto& emission = volume.emission;
@@ -223,7 +301,7 @@ Status write_volume(const Volume& volume, const std::filesystem::path& path,
   openvdb::GridPtrVec grids{emission_grid, density_grid};
   for (const NamedGrid& grid : further)
     grids.push_back(grid_of(volume.grid, grid.name, grid.unit, grid.values));
-  return write_file(grids, {}, path, kEnd);
+  return write_file(grids, metadata_of(lighting), path, kEnd);
 }
 
 Result<Volume> read_volume(const std::filesystem::path& path) try {
@@ -244,6 +322,23 @@ Result<Volume> read_volume(const std::filesystem::path& path) try {
   EMBERLOCK_RETURN_IF_ERROR(take_values(*density, volume.grid, "density", path,
                                         [&](std::size_t p, float value) { volume.extinction[p] = value; }));
   return volume;
+} catch (const std::exception& e) {
+  return damaged(path, e.what());
+}
+
+Result<Lighting> read_lighting(const std::filesystem::path& path) try {
+  EMBERLOCK_ASSIGN_OR_RETURN(const auto file, opened(path));
+  const openvdb::MetaMap::Ptr about = file->getMetadata();
+  ReadMetadata read(*about, path);
+  Lighting lighting;
+  if (read.has(kScattering))
+    lighting.scattering = {read.one_of(kOrders, kScattering), read.number(kAlbedo), read.number(kAsymmetry)};
+  if (read.has(kLight))
+    lighting.light = {read.one_of(kSources, kLight), read.three(kLightPlace), read.three(kLightStrength),
+                      read.three(kLightAmbient)};
+  EMBERLOCK_RETURN_IF_ERROR(read.status());
+  if (const Status in_range = check(lighting); !in_range.ok()) return damaged(path, in_range.error().what);
+  return lighting;
 } catch (const std::exception& e) {
   return damaged(path, e.what());
 }

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "base/result.h"
+#include "recon/effects/lighting.h"
 #include "recon/export/shared_volume.h"
 #include "recon/render/volume.h"
 
@@ -26,14 +27,21 @@ struct NamedGrid {
 /// Index (i, j, k) is key point (i, j, k); the grids' transform maps indices to metres. Points with value
 /// zero are inactive (background 0). Voxels below 0.02 mm, which OpenVDB refuses, are written in millimetres,
 /// with `emberlock_metres_per_unit` 0.001. The metadata contain the units and the dimensions
-/// (`emberlock_dimensions`), which a sparse grid loses. `path` is written in place: call it inside an
-/// OutputFolder.
+/// (`emberlock_dimensions`), which a sparse grid loses. The file's metadata tell what the medium scatters:
+/// `emberlock_scattering` (single or multiple), `emberlock_albedo` and `emberlock_asymmetry`, of light that
+/// isn't in `emission`; `emberlock_light` (even, distant or nearby), `_place` (towards it, or metres),
+/// `_strength` and `_ambient` (grey levels, as Light has them), of light whose scattered part is `emission`.
+/// `path` is written in place: call it inside an OutputFolder.
 Status write_volume(const Volume& volume, const std::filesystem::path& path,
-                    const std::vector<NamedGrid>& further = {});
+                    const std::vector<NamedGrid>& further = {}, const Lighting& lighting = {});
 
 /// Reads a file of write_volume(), bit-identically; a density without active points becomes an empty
 /// extinction. Errors: not an OpenVDB file; missing grids or metadata.
 Result<Volume> read_volume(const std::filesystem::path& path);
+
+/// What a file's medium scatters; nothing in files that don't tell. Errors: not an OpenVDB file; metadata of
+/// another type, a word that isn't known or a value that is missing or out of its range.
+Result<Lighting> read_lighting(const std::filesystem::path& path);
 
 /// The values of a further grid, bit-identically; 0 where none is active. Errors: as read_volume(); no such
 /// grid.
@@ -58,8 +66,8 @@ enum class VdbSamples {
 /// point of class FOG_VOLUME; a scalar grid `density` even where nothing is dense, as without one Blender's
 /// Principled Volume takes the whole box for dense. Meaning and unit of a grid and where the volume comes
 /// from stand in its metadata (`meaning`, `unit`, `creator`, `emberlock_input`, `emberlock_frame`,
-/// `emberlock_up`), and the latter in the file's. At the index, read_volume() reads it too. Errors: as
-/// write_volume().
+/// `emberlock_up`, and what the medium scatters, as write_volume() has it), and the latter in the file's. At
+/// the index, read_volume() and read_lighting() read it too. Errors: as write_volume().
 Status write_vdb(const SharedVolume& volume, const std::filesystem::path& path, VdbSamples samples);
 
 }  // namespace emberlock::recon

@@ -39,6 +39,8 @@ void append_field(pugi::xml_node image, const SharedVolume& volume) {
   append_text(field, "program", from.program);
   append_text(field, "input", from.input);
   append_text(field, "up", from.up);
+  append_text(field, "scattering", words(from.lighting.scattering));
+  append_text(field, "light", words(from.lighting.light));
   if (from.frame) {
     pugi::xml_node array = field.append_child("DataArray");
     array.append_attribute("type") = "Int64";

@@ -220,8 +220,9 @@ Status write_outcome(const Outcome& outcome, const fs::path& folder, const std::
                      std::string_view page) {
   EMBERLOCK_ASSIGN_OR_RETURN(OutputFolder staging, OutputFolder::create({folder, kReconstruct, inputs}));
   const FurtherGrids further(outcome);
-  EMBERLOCK_RETURN_IF_ERROR(
-      write_volume(outcome.reconstruction.volume, staging.path() / "volume.vdb", further.grids));
+  const Effects& effects = outcome.reconstruction.effects;
+  EMBERLOCK_RETURN_IF_ERROR(write_volume(outcome.reconstruction.volume, staging.path() / "volume.vdb",
+                                         further.grids, {effects.scattering, effects.light}));
   std::error_code ec;
   fs::create_directory(staging.path() / "views", ec);
   for (std::size_t i = 0; i < outcome.renders.size(); ++i) {

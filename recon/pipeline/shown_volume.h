@@ -8,21 +8,32 @@
 #include "recon/calibrate/box.h"
 #include "recon/calibrate/camera_model.h"
 #include "recon/compute/device.h"
+#include "recon/effects/lighting.h"
+#include "recon/hull/medium.h"
 #include "recon/preprocess/radiance_image.h"
+#include "recon/render/in_scatter.h"
 #include "recon/render/volume.h"
 
 namespace emberlock::recon {
 
-/// A result's volume, and the temperatures of its key points, K, 0 where not told; empty where none were
-/// reconstructed.
+/// A result's volume, what its medium scatters, and the temperatures of its key points, K, 0 where not told;
+/// empty where none were reconstructed.
 struct ShownVolume {
   Volume volume;
-  std::vector<float> kelvin;
+  Lighting lighting = {};
+  std::vector<float> kelvin = {};
 };
-/// The folder of a result of `reconstruct`, or a volume.vdb. Errors: those of read_volume() and
-/// read_values().
+/// The folder of a result of `reconstruct`, or a volume.vdb. Errors: those of read_volume(), read_lighting()
+/// and read_values().
 Result<ShownVolume> read_shown_volume(const std::filesystem::path& result);
 Box box_of(const Grid& grid);
+
+/// Puts another light into the place of that which a lit medium was filmed under. Where nothing shades it,
+/// and of one nearby in the middle of the box, it is as bright and of the colour as that was, with what came
+/// from all sides: all of `even`'s light comes from all sides, and none of the others'. `light` tells the
+/// source and its place, as parse_effects() reads them. Errors: a volume that wasn't lit from outside, or is
+/// empty; a light that is to be found, or stands inside of the box.
+Status relight(ShownVolume& shown, Light light, const ComputeOptions& compute = {});
 
 /// What a camera sees of a volume, before black.
 struct ShownView {
@@ -31,15 +42,19 @@ struct ShownView {
       opacity;  ///< of each pixel, 0..1: the share of what lies behind that doesn't come through
 };
 
-/// Shows a volume's light to any cameras. What was scattered isn't in it. Throws as render_views() does.
+/// Shows a volume's light to any cameras: what it emits, and what it scatters of that, which is computed
+/// once. Throws as render_views() does.
 class LightViews {
  public:
-  explicit LightViews(Volume volume, const ComputeOptions& compute = {});
+  explicit LightViews(Volume volume, const Scattering& scattering = {}, const ComputeOptions& compute = {});
   [[nodiscard]] std::vector<ShownView> of(const std::vector<const CameraModel*>& cameras) const;
 
  private:
   Volume volume_, dark_;  // the same without its light
+  Effects effects_;
   ComputeOptions compute_;
+  Hull medium_;  // of the volume
+  ScatterField scattered_;
 };
 
 /// Shows its temperatures: the mean along each ray, weighted by the light that reaches the camera.

@@ -63,7 +63,8 @@ class Reach {
 
 std::vector<float> light_that_reaches(const std::vector<Rgba>& medium, const Grid& grid, const Light& light,
                                       Pool& pool) {
-  if (light.source == Light::Source::even) return std::vector<float>(grid.size(), 1.F);
+  if (light.source != Light::Source::distant && light.source != Light::Source::nearby)
+    return std::vector<float>(grid.size(), 1.F);
   std::vector<Rgba> dark(grid.size());
   for (std::size_t p = 0; p < dark.size(); ++p) dark[p].c[3] = medium[p].c[3];
   const int every = std::max(1, (std::max({grid.nx, grid.ny, grid.nz}) - 1 + kMostPlaces - 1) / kMostPlaces);
@@ -96,6 +97,19 @@ std::vector<float> light_that_reaches(const std::vector<Rgba>& medium, const Gri
     }
   });
   return out;
+}
+
+std::vector<float> lit_emission(const Volume& volume, const Light& light, Pool& pool) {
+  std::vector<Rgba> medium(volume.extinction.size());
+  for (std::size_t p = 0; p < medium.size(); ++p) medium[p].c[3] = volume.grid.edge * volume.extinction[p];
+  const std::vector<float> reach = light_that_reaches(medium, volume.grid, light, pool);
+  std::vector<float> source(3 * medium.size());
+  for (std::size_t p = 0; p < medium.size(); ++p)
+    for (std::size_t c = 0; c < 3; ++c)
+      source[3 * p + c] =
+          volume.extinction[p] *
+          static_cast<float>(light.ambient[c] + light.strength[c] * static_cast<double>(reach[p]));
+  return source;
 }
 
 }  // namespace emberlock::recon

@@ -48,7 +48,8 @@ void take_out_in_scatter(Volume& volume, const Hull& medium, const Effects& effe
     add_in_scatter(field, Eigen::Vector3d::Zero(), volume.grid, effects.extinction, pool, scattered);
     for (std::size_t p = 0; p < scattered.size(); ++p) {
       for (std::size_t c = 0; c < 3; ++c) {
-        const float in = per_meter * scattered[p].c[c];
+        // Beyond the medium's box G is extrapolated, to negative values too.
+        const float in = std::max(0.F, per_meter * scattered[p].c[c]);
         const float out = std::max(0.F, seen[3 * p + c] - in);
         volume.emission[3 * p + c] = out;
         source.emission[3 * p + c] = scattered_again ? out + in : out;

@@ -129,6 +129,18 @@ TEST_F(ExportCommandTest, GridsAreThoseAskedFor) {
   EXPECT_NE(shared->find("density"), nullptr) << "Blender takes a box without it for dense";
 }
 
+TEST_F(ExportCommandTest, FilesTellWhatTheMediumScatters) {
+  const recon::Lighting lighting{{recon::Scattering::Order::single, 0.4, 0.6}, {}};
+  const auto volume = recon::read_volume(folder_ / "hot" / "volume.vdb");
+  ASSERT_TRUE(recon::write_volume(*volume, folder_ / "hot" / "volume.vdb", {}, lighting).ok());
+  ASSERT_EQ(run("hot").exit_code, 0);
+  const auto told = recon::read_lighting(out_ / "flame.vdb");
+  ASSERT_TRUE(told.ok()) << told.error().message();
+  EXPECT_EQ(told->scattering.albedo, 0.4);
+  ASSERT_EQ(run("hot", {"--format", "vti"}).exit_code, 0);
+  EXPECT_THAT(*read_file(out_ / "flame.vti"), HasSubstr(R"(Name="scattering")"));
+}
+
 TEST_F(ExportCommandTest, RefusesWhatIsNoResult) {
   fs::create_directory(folder_ / "pictures");
   expect_refused(run("pictures"), "has no volume.vdb");

@@ -20,6 +20,7 @@ namespace emberlock::cli {
 namespace {
 namespace fs = std::filesystem;
 using testing::HasSubstr;
+using testing::Not;
 
 /// A cube of light in the middle of a box, red and half as green.
 class RenderCommandTest : public testing::Test {
@@ -54,6 +55,13 @@ class RenderCommandTest : public testing::Test {
   }
   [[nodiscard]] cv::Mat picture(const std::string& name) const {
     return cv::imread((out_ / name).string(), cv::IMREAD_UNCHANGED);
+  }
+  /// The result with a medium that scatters.
+  void tell(const recon::Lighting& lighting) const {
+    const fs::path file = folder_ / "result" / "volume.vdb";
+    const auto volume = recon::read_volume(file);
+    ASSERT_TRUE(volume.ok()) << volume.error().message();
+    ASSERT_TRUE(recon::write_volume(*volume, file, {}, lighting).ok());
   }
   void expect_refused(const test::VerbRun& result, const std::string& why) const {
     EXPECT_EQ(result.exit_code, 2);
@@ -108,6 +116,39 @@ TEST_F(RenderCommandTest, BeforeNothingAPictureHasAnOpacity) {
   EXPECT_GT(middle[3], 60);
   EXPECT_LT(middle[3], 255);
   EXPECT_EQ(middle[2], 255) << "as bright as its opacity allows";
+}
+
+TEST_F(RenderCommandTest, WhatIsScatteredIsShownAndSaid) {
+  const std::vector<std::string> from_the_side = {"--camera", "0.5,0,0"};
+  const auto without = run(from_the_side);
+  ASSERT_EQ(without.exit_code, 0) << without.err;
+  EXPECT_THAT(without.out, Not(HasSubstr("scattering")));
+  const int plain = picture("frame-0000.png").at<cv::Vec3b>(24, 32)[2];
+  tell({{recon::Scattering::Order::multiple, 0.9, 0}, {}});
+  const auto with = run(from_the_side);
+  ASSERT_EQ(with.exit_code, 0) << with.err;
+  EXPECT_THAT(with.out, HasSubstr("scattering       multiple, albedo 0.9, g 0"));
+  EXPECT_GT(picture("frame-0000.png").at<cv::Vec3b>(24, 32)[2], plain + 3);
+}
+
+TEST_F(RenderCommandTest, ALitResultIsShownInAnotherLight) {
+  fs::remove_all(out_);
+  expect_refused(run({"--camera", "0.5,0,0", "--light", "even"}), "--light: wasn't reconstructed as lit");
+  tell({{}, {recon::Light::Source::even, {}, {}, {200, 100, 50}}});
+  const auto own = run({"--camera", "0.5,0,0"});
+  ASSERT_EQ(own.exit_code, 0) << own.err;
+  EXPECT_THAT(own.out, HasSubstr("light            even: 200 / 100 / 50 grey levels from all sides"));
+  const auto other = run({"--camera", "0.5,0,0", "--light", "distant:y=1"});
+  ASSERT_EQ(other.exit_code, 0) << other.err;
+  EXPECT_THAT(other.out, HasSubstr("distant, from the direction 0, 1, 0"));
+  // +y is to the camera's right: an extinction of 5 / m takes 26 % over the cube's 6 cm.
+  const cv::Mat seen = picture("frame-0000.png");
+  EXPECT_GT(seen.at<cv::Vec3b>(24, 34)[2], seen.at<cv::Vec3b>(24, 30)[2] + 2);
+  ASSERT_EQ(run({"--camera", "0.5,0,0", "--light", "none"}).exit_code, 0);
+  EXPECT_EQ(cv::norm(picture("frame-0000.png"), cv::NORM_INF), 0);
+  fs::remove_all(out_);
+  for (const char* bad : {"sun", "distant", "found", "even,scattering=single", "nearby:x=0.01"})
+    expect_refused(run({"--camera", "0.5,0,0", "--light", bad}), "--light");
 }
 
 TEST_F(RenderCommandTest, TemperaturesSayWhatTheirColoursMean) {

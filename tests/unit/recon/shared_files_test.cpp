@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <cstring>
 #include <filesystem>
+#include <fstream>
 #include <functional>
 #include <limits>
 #include <sstream>
@@ -52,6 +53,7 @@ SharedVolume some_flame() {
                  {"emission", "grey levels (0..255) per metre", "light", emission},
                  {"temperature", "K", "", kelvin}};
   flame.provenance = {"Emberlock 1.2.3", "take <2> & \"more\"", "-y", 42};
+  flame.provenance.lighting.light = {Light::Source::distant, {1, 0.5, -1}, {200, 190, 180}, {3, 2, 1}};
   return flame;
 }
 
@@ -135,9 +137,62 @@ TEST_F(SharedFiles, AnExportIsAVolumeOfOursToo) {
   ASSERT_EQ(shared->grids.size(), 3U);
   EXPECT_EQ(shared->find("temperature")->values, flame_.grids[2].values);
   EXPECT_EQ(shared->find("temperature")->unit, "K");
+  const auto lighting = read_lighting(path);
+  ASSERT_TRUE(lighting.ok()) << lighting.error().message();
+  EXPECT_EQ(lighting->light.source, Light::Source::distant);
+  EXPECT_EQ(lighting->light.place, flame_.provenance.lighting.light.place);
+  EXPECT_EQ(lighting->light.strength, flame_.provenance.lighting.light.strength);
   // Values that lie elsewhere than OpenVDB says are none.
   ASSERT_TRUE(write_vdb(flame_, path, VdbSamples::half_an_edge_later).ok());
   EXPECT_FALSE(read_volume(path).ok());
+}
+
+/// A volume of ours whose file has other metadata.
+void write_with(const openvdb::MetaMap& about, const fs::path& path) {
+  ASSERT_TRUE(write_vdb(some_flame(), path, VdbSamples::at_index).ok());
+  openvdb::io::File from(path.string());
+  from.open();
+  const openvdb::GridPtrVecPtr grids = from.getGrids();
+  from.close();
+  openvdb::io::File(path.string()).write(*grids, about);
+  std::ofstream(path, std::ios::binary | std::ios::app) << "emberlock: end of volume";
+}
+
+TEST_F(SharedFiles, LightThatAFileTellsInAnotherWayIsRefused) {
+  const fs::path path = folder_ / "flame.vdb";
+  using openvdb::DoubleMetadata;
+  using openvdb::StringMetadata;
+  const StringMetadata single("single");
+  const DoubleMetadata half(0.5);
+  openvdb::MetaMap about;
+  about.insertMeta("emberlock_scattering", single);
+  about.insertMeta("emberlock_albedo", half);
+  about.insertMeta("emberlock_asymmetry", half);
+  write_with(about, path);
+  ASSERT_TRUE(read_lighting(path).ok()) << read_lighting(path).error().message();
+  const StringMetadata sideways("sideways");
+  const openvdb::Int32Metadata whole(1);
+  for (const auto& [key, value] :
+       {std::pair<const char*, const openvdb::Metadata*>("emberlock_scattering", &sideways),
+        {"emberlock_scattering", &whole},
+        {"emberlock_albedo", nullptr},
+        {"emberlock_albedo", &single},
+        {"emberlock_asymmetry", &whole},
+        {"emberlock_light", &half},
+        {"emberlock_light", &single}}) {
+    openvdb::MetaMap other(about);
+    other.removeMeta(key);
+    if (value != nullptr) other.insertMeta(key, *value);
+    write_with(other, path);
+    const auto read = read_lighting(path);
+    ASSERT_FALSE(read.ok()) << key;
+    EXPECT_THAT(read.error().message(), HasSubstr(key));
+  }
+  openvdb::MetaMap lit;
+  lit.insertMeta("emberlock_light", StringMetadata("even"));
+  lit.insertMeta("emberlock_light_place", half);
+  write_with(lit, path);
+  EXPECT_THAT(read_lighting(path).error().message(), HasSubstr("emberlock_light_place"));
 }
 
 TEST_F(SharedFiles, BeforeBlender5AKeyPointIsHalfAnEdgeBehindItsIndex) {
@@ -263,6 +318,8 @@ TEST_F(SharedFiles, VtkReadsTheSameBitsAtTheirPlaces) {
   EXPECT_STREQ(file.array("emission").attribute("ComponentName2").value(), "blue");
   EXPECT_STREQ(image.child("Piece").child("PointData").attribute("Scalars").value(), "flame");
   EXPECT_EQ(file.text("program"), "Emberlock 1.2.3");
+  EXPECT_THAT(file.text("light"), HasSubstr("distant, from the direction 1, 0.5, -1"));
+  EXPECT_EQ(file.text("scattering"), "");
   EXPECT_EQ(file.text("input"), flame.provenance.input);
   EXPECT_THAT(file.text("meaning of flame"), HasSubstr("grey levels per metre"));
   EXPECT_TRUE(file.bytes.ends_with("</AppendedData>\n</VTKFile>\n"));

@@ -11,6 +11,7 @@
 #include <gtest/gtest.h>
 
 #include "base/clock.h"
+#include "drivers/virtual/virtual_clock.h"
 
 namespace emberlock::drivers {
 namespace {
@@ -70,7 +71,7 @@ class GreyWall final : public Camera {
 };
 
 TEST(ExampleCamera, FilmsAndCountsEachFrameOnce) {
-  SteadyClock clock;
+  VirtualClock clock;
   GreyWall camera("wall-1", clock);
   EXPECT_EQ(camera.next_frame(Seconds(1)).error().kind, ErrorKind::device);
   ASSERT_TRUE(camera.start().ok());

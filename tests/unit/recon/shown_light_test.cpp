@@ -122,6 +122,14 @@ double difference(const RadianceImage& a, const RadianceImage& b) {
   return std::sqrt(squares / static_cast<double>(a.rgb.size())) / brightest;
 }
 
+Result<Reconstruction> solved_roughly(const Scene& scene, const Effects& effects, int iterations) {
+  SolveOptions options;
+  options.compute = on_cpu();
+  options.iterations = iterations;
+  options.smoothness = 1;
+  return solve(scene, grid_over(scene.box, 24), effects, options);
+}
+
 /// What a camera sees of a reconstruction's file.
 RadianceImage shown_from_file(const Reconstruction& done, const CameraModel& camera) {
   const test::TempFolder folder;
@@ -142,11 +150,7 @@ TEST(ShownLight, AnInputCameraSeesWhatTheReconstructionSays) {
   effects.light = test::distant_light({1, -0.5, 0.4});
   effects.extinction = {Extinction::Model::field, PerMeter(0), PerMeter(5)};
   const Scene scene = film_lit(smoke, lit_truth(smoke, effects.light));
-  SolveOptions options;
-  options.compute = on_cpu();
-  options.iterations = 4;
-  options.smoothness = 1;
-  const auto done = solve(scene, grid_over(scene.box, 24), effects, options);
+  const auto done = solved_roughly(scene, effects, 4);
   ASSERT_TRUE(done.ok()) << done.error().message();
   const CameraModel& camera = scene.views[0].camera;
   const RadianceImage said = render_view(done->volume, done->hull, done->effects, camera);
@@ -170,11 +174,7 @@ void expect_shown_as_said(const Scattering& scattering, bool field) {
   effects.scattering = scattering;
   effects.extinction = constant_extinction(PerMeter(30));
   if (field) effects.extinction.model = Extinction::Model::field;
-  SolveOptions options;
-  options.compute = on_cpu();
-  options.iterations = 2;
-  options.smoothness = 1;
-  const auto done = solve(scene, grid_over(scene.box, 24), effects, options);
+  const auto done = solved_roughly(scene, effects, 2);
   ASSERT_TRUE(done.ok()) << done.error().message();
   const CameraModel& camera = scene.views[0].camera;
   const RadianceImage shown = shown_from_file(*done, camera);

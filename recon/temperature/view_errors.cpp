@@ -61,6 +61,12 @@ VolumeErrors variances(Deviations sums, const Grid& grid, int groups, Pool& pool
   return {std::move(sums.products), std::move(sums.squares), groups, Seconds(0)};
 }
 
+int left_out_groups(const Scene& scene) {
+  const auto inputs = std::count_if(scene.views.begin(), scene.views.end(),
+                                    [](const View& v) { return v.role == ViewRole::input; });
+  return std::min(static_cast<int>(inputs), kMostLeftOut);
+}
+
 }  // namespace
 
 Eigen::Matrix3d VolumeErrors::covariance(std::size_t point) const {
@@ -75,12 +81,6 @@ Eigen::Matrix3d VolumeErrors::covariance(std::size_t point) const {
 
 Eigen::Vector3d VolumeErrors::sigma(std::size_t point) const {
   return covariance(point).diagonal().cwiseSqrt();
-}
-
-int left_out_groups(const Scene& scene) {
-  const auto inputs = std::count_if(scene.views.begin(), scene.views.end(),
-                                    [](const View& v) { return v.role == ViewRole::input; });
-  return std::min(static_cast<int>(inputs), kMostLeftOut);
 }
 
 LeftOutGroup leave_out(const Scene& scene, int group) {

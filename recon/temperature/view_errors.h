@@ -26,11 +26,11 @@ struct VolumeErrors {
 /// At most so many groups: each is a solve.
 inline constexpr int kMostLeftOut = 10;
 
-/// The input views in groups, spread around: one group's, and the others, without views that are held out.
+/// Of kMostLeftOut groups of input views, spread around, or as many as there are views: one group's, and the
+/// others, without views that are held out.
 struct LeftOutGroup {
   Scene left_out, others;
 };
-int left_out_groups(const Scene& scene);
 LeftOutGroup leave_out(const Scene& scene, int group);
 /// The same solve as led to a result: its smoothness and number of passes, no budget.
 SolveOptions to_solve_again(const Reconstruction& done, const SolveOptions& options);

@@ -63,7 +63,8 @@ Flame::View Flame::seen_by(const recon::CameraModel& camera, double step, recon:
   view.ray_of_pixel.assign(static_cast<std::size_t>(size.width) * static_cast<std::size_t>(size.height), -1);
   if (medium_.count == 0) return view;
   if (!scattered_.empty())
-    recon::add_in_scatter(scattered_, beside.center(), crop_.hull.grid, effects_.extinction, pool, view.source);
+    recon::add_in_scatter(scattered_, beside.center(), crop_.hull.grid, effects_.extinction, pool,
+                          view.source);
   recon::RayListOptions options;
   options.step = static_cast<float>(step);
   view.rays = recon::clip_rays({&beside}, crop_.hull, options, pool);
@@ -87,8 +88,8 @@ void Flame::add_steps(const View& view, std::size_t pixel, RayLight& light) cons
     float reached = run.start * meters;
     auto put = [&](int sample, std::int32_t base, float fx, float fy, float fz) {
       const float to = (run.start + static_cast<float>(sample + 1) * run.step) * meters;
-      steps.push_back({reached, to,
-                       per_meter * recon::trilinear(view.source.data() + base, row, plane, fx, fy, fz)});
+      steps.push_back(
+          {reached, to, per_meter * recon::trilinear(view.source.data() + base, row, plane, fx, fy, fz)});
       reached = to;
     };
     recon::each_sample<float>(table, recon::StraightPath::line<float>(table, n), run, put);
@@ -181,8 +182,7 @@ std::vector<Flame::Emitter> Flame::emitters() const {
           const recon::Rgba& s = coarse_.shine[g.index(i + (c & 1), j + (c >> 1 & 1), k + (c >> 2))];
           sum += static_cast<double>(s.c[0] + s.c[1] + s.c[2]);
         }
-        if (sum > 0)
-          all.push_back({static_cast<std::uint32_t>(g.index(i, j, k)), sum / 24 * edge * edge});
+        if (sum > 0) all.push_back({static_cast<std::uint32_t>(g.index(i, j, k)), sum / 24 * edge * edge});
       }
   return all;
 }
@@ -191,7 +191,8 @@ Flame::Sent Flame::sent(std::uint32_t voxel, const Eigen::Vector3d& within) cons
   const recon::Grid& g = coarse_.grid;
   const auto nx = static_cast<std::uint32_t>(g.nx);
   const auto ny = static_cast<std::uint32_t>(g.ny);
-  const Eigen::Vector3d corner(voxel % nx, voxel / nx % ny, voxel / nx / ny);  // NOLINT(bugprone-integer-division)
+  const Eigen::Vector3d corner(voxel % nx, voxel / nx % ny,
+                               voxel / nx / ny);  // NOLINT(bugprone-integer-division)
   const Eigen::Vector3d origin(static_cast<double>(g.origin[0]), static_cast<double>(g.origin[1]),
                                static_cast<double>(g.origin[2]));
   const double edge = static_cast<double>(g.edge);

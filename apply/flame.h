@@ -21,9 +21,9 @@
 namespace emberlock::apply {
 
 /// A flame that stands in a scene. To a camera it shows its volume, marched through as render_view() does, by
-/// the rays of a camera that is placed beside the volume as the scene's camera is beside the flame. To surfaces
-/// it is a coarse grid (recon/render/coarse_medium.h): as much light, on at most `light_voxels` voxels along its
-/// longest side.
+/// the rays of a camera that is placed beside the volume as the scene's camera is beside the flame. To
+/// surfaces it is a coarse grid (recon/render/coarse_medium.h): as much light, on at most `light_voxels`
+/// voxels along its longest side.
 class Flame {
  public:
   /// `brightness` is the factor of its light.
@@ -43,8 +43,8 @@ class Flame {
 
   // What surfaces see.
 
-  /// Whether a place is in the flame's box, or nearer to it than a quarter of its longest side: there the light
-  /// of its parts is too uneven to be taken from a few of them.
+  /// Whether a place is in the flame's box, or nearer to it than a quarter of its longest side: there the
+  /// light of its parts is too uneven to be taken from a few of them.
   [[nodiscard]] bool near(const Eigen::Vector3d& place) const;
   /// The optical depth between two places.
   [[nodiscard]] double depth_between(const Eigen::Vector3d& a, const Eigen::Vector3d& b) const;
@@ -74,8 +74,10 @@ class Flame {
 
  private:
   [[nodiscard]] Eigen::Vector3d in_coarse_edges(const Eigen::Vector3d& world) const;
-  /// The part of a line (coarse edges) inside of the coarse box, in multiples of `along`; empty: first > second.
-  [[nodiscard]] std::pair<double, double> inside(const Eigen::Vector3d& from, const Eigen::Vector3d& along) const;
+  /// The part of a line (coarse edges) inside of the coarse box, in multiples of `along`; empty: first >
+  /// second.
+  [[nodiscard]] std::pair<double, double> inside(const Eigen::Vector3d& from,
+                                                 const Eigen::Vector3d& along) const;
 
   recon::Volume volume_;
   recon::Lighting lighting_;

@@ -48,7 +48,8 @@ Eigen::Matrix4d matrix_of(const Placement& place) {
 Placement placement_in(const Eigen::Matrix4d& m, const std::string& where) {
   const Eigen::Matrix3d linear = m.topLeftCorner<3, 3>();
   const double scale = std::cbrt(std::abs(linear.determinant()));
-  if (!(scale > 0) || !((linear.transpose() * linear / (scale * scale) - Eigen::Matrix3d::Identity()).norm() < 1e-3))
+  if (!(scale > 0) ||
+      !((linear.transpose() * linear / (scale * scale) - Eigen::Matrix3d::Identity()).norm() < 1e-3))
     refuse("is stretched or sheared", where, "Scale flames and cameras evenly");
   return {linear / scale, m.topRightCorner<3, 1>(), scale};
 }
@@ -82,8 +83,9 @@ class Elements {
     const tinygltf::BufferView& view = entry(model.bufferViews, a.bufferView, "bufferView");
     const tinygltf::Buffer& buffer = entry(model.buffers, view.buffer, "buffer");
     const int stride = a.ByteStride(view);
-    const auto size = static_cast<std::size_t>(std::max(0, tinygltf::GetComponentSizeInBytes(static_cast<std::uint32_t>(a.componentType)) *
-                                                               tinygltf::GetNumComponentsInType(static_cast<std::uint32_t>(type))));
+    const auto size = static_cast<std::size_t>(
+        std::max(0, tinygltf::GetComponentSizeInBytes(static_cast<std::uint32_t>(a.componentType)) *
+                        tinygltf::GetNumComponentsInType(static_cast<std::uint32_t>(type))));
     if (stride <= 0 || size == 0 || static_cast<std::size_t>(stride) < size)
       refuse(fmt::format("accessor {} has no step", accessor), where);
     stride_ = static_cast<std::size_t>(stride);
@@ -166,7 +168,8 @@ class GltfReader {
     if (!model.lights.empty()) notes_.insert("its lights are left out: flames are the light");
     const Eigen::Matrix4d top = matrix_of(world_from_file) * world_axes();
     if (model.scenes.empty()) refuse("has no scene", "scenes");
-    for (const int node : entry(model.scenes, std::max(0, model.defaultScene), "scene").nodes) walk(node, top, 0);
+    for (const int node : entry(model.scenes, std::max(0, model.defaultScene), "scene").nodes)
+      walk(node, top, 0);
   }
   [[nodiscard]] GltfScene found() && {
     scene_.notes.assign(notes_.begin(), notes_.end());
@@ -195,8 +198,8 @@ class GltfReader {
     if (node.extras.IsObject() && node.extras.Has("emberlock_flame")) {
       const tinygltf::Value& result = node.extras.Get("emberlock_flame");
       if (!result.IsString()) refuse("emberlock_flame isn't a path", where);
-      scene_.flames.push_back({result.Get<std::string>(),
-                               placement_in(world_from_node * world_axes().transpose(), where)});
+      scene_.flames.push_back(
+          {result.Get<std::string>(), placement_in(world_from_node * world_axes().transpose(), where)});
     }
     for (const int child : node.children) walk(child, world_from_node, depth + 1);
   }
@@ -230,7 +233,8 @@ class GltfReader {
       for (std::size_t i = 0; i < corners.size(); ++i) corners[i] = static_cast<std::uint32_t>(i);
     }
     const std::size_t count = corners.size() / 3;
-    if (mesh_.triangles.size() + count > kMostTriangles || mesh_.vertices.size() + places.size() > 3 * kMostTriangles)
+    if (mesh_.triangles.size() + count > kMostTriangles ||
+        mesh_.vertices.size() + places.size() > 3 * kMostTriangles)
       refuse(fmt::format("has more than {} triangles", kMostTriangles), where, "Simplify the geometry");
     const auto base = static_cast<std::uint32_t>(mesh_.vertices.size());
     for (std::size_t i = 0; i < places.size(); ++i) {
@@ -250,7 +254,8 @@ class GltfReader {
     for (std::size_t t = 0; t < count; ++t) {
       for (std::size_t c = 0; c < 3; ++c)
         if (corners[3 * t + c] >= places.size()) refuse("a triangle's corner isn't there", where);
-      mesh_.triangles.push_back({base + corners[3 * t], base + corners[3 * t + 1], base + corners[3 * t + 2]});
+      mesh_.triangles.push_back(
+          {base + corners[3 * t], base + corners[3 * t + 1], base + corners[3 * t + 2]});
       mesh_.material.push_back(first_material_ + material);
     }
   }

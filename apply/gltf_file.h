@@ -22,9 +22,9 @@ struct Material {
 
 /// Triangles in the world.
 struct Mesh {
-  std::vector<std::array<float, 3>> vertices;            ///< metres
-  std::vector<std::array<std::uint32_t, 3>> triangles;   ///< of vertices
-  std::vector<std::uint32_t> material;                   ///< of each triangle
+  std::vector<std::array<float, 3>> vertices;           ///< metres
+  std::vector<std::array<std::uint32_t, 3>> triangles;  ///< of vertices
+  std::vector<std::uint32_t> material;                  ///< of each triangle
   std::vector<Material> materials;
 };
 inline constexpr std::size_t kMostTriangles = 5'000'000;
@@ -39,17 +39,17 @@ struct GltfScene {
     Placement world_from_camera;  ///< axes as CameraModel's: x right, y down, z forward
     Radians height;               ///< angle that the picture's height spans
   };
-  std::vector<Flame> flames;     ///< nodes with a text `emberlock_flame` in their extras
-  std::vector<Camera> cameras;   ///< perspective ones
+  std::vector<Flame> flames;       ///< nodes with a text `emberlock_flame` in their extras
+  std::vector<Camera> cameras;     ///< perspective ones
   std::vector<std::string> notes;  ///< what the file asks for and isn't shown
 };
 
-/// Adds the triangles of a .gltf or .glb file's scene to `mesh`, at their nodes' places. glTF's y axis becomes
-/// z, its z -y, as in Blender; then the file is placed. Of materials, the base colour's and the emission's
-/// factors count (KHR_materials_emissive_strength too). Textures, metal, transparency, normals, skins and
-/// animation are left out, which `notes` tell. Errors: bad_input: not glTF, a required extension, a missing or
-/// short buffer, indices out of range, a node that is reached twice (a cycle too), values that aren't finite,
-/// nothing but points or lines, more than kMostTriangles. `mesh` is undefined after an error.
+/// Adds the triangles of a .gltf or .glb file's scene to `mesh`, at their nodes' places. glTF's y axis
+/// becomes z, its z -y, as in Blender; then the file is placed. Of materials, the base colour's and the
+/// emission's factors count (KHR_materials_emissive_strength too). Textures, metal, transparency, normals,
+/// skins and animation are left out, which `notes` tell. Errors: bad_input: not glTF, a required extension, a
+/// missing or short buffer, indices out of range, a node that is reached twice (a cycle too), values that
+/// aren't finite, nothing but points or lines, more than kMostTriangles. `mesh` is undefined after an error.
 Result<GltfScene> read_gltf(const std::filesystem::path& file, const Placement& world_from_file, Mesh& mesh);
 
 }  // namespace emberlock::apply

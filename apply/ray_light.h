@@ -9,8 +9,8 @@
 namespace emberlock::apply {
 
 /// What flames do to the light along one ray, several of them merged by distance: each is a row of steps with
-/// constant values, and where they overlap their emission and their extinction add up. Within a step light goes
-/// as in the march (recon/render/render.h): L += T S ds phi(sigma ds), T *= exp(-sigma ds).
+/// constant values, and where they overlap their emission and their extinction add up. Within a step light
+/// goes as in the march (recon/render/render.h): L += T S ds phi(sigma ds), T *= exp(-sigma ds).
 class RayLight {
  public:
   /// A part of the ray, in metres; lanes 0..2 the source, grey levels per metre, lane 3 the extinction, 1/m.

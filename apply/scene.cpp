@@ -74,7 +74,8 @@ Result<Scene> Scene::load(SceneFile file, int light_voxels, recon::Pool& pool) {
   Mesh mesh;
   std::vector<std::string> notes;
   for (const PlacedFile& geometry : file.geometry) {
-    EMBERLOCK_ASSIGN_OR_RETURN(const GltfScene read, read_gltf(geometry.file, geometry.world_from_file, mesh));
+    EMBERLOCK_ASSIGN_OR_RETURN(const GltfScene read,
+                               read_gltf(geometry.file, geometry.world_from_file, mesh));
     for (const std::string& note : read.notes) notes.push_back(geometry.file.string() + ": " + note);
   }
   const std::size_t triangles = mesh.triangles.size();
@@ -121,8 +122,7 @@ Result<std::vector<recon::CameraModel>> Scene::cameras(ImageSize size, int frame
   for (const CameraPlan::Stop& stop : plan.stops)
     path.push_back(with_view(recon::looking(stop.from, stop.at, plan.up, size), plan.field_of_view));
   if (path.size() > 1) {
-    if (frames < 2)
-      return Error{ErrorKind::bad_input, "a path needs two frames", "--frames", "Give more"};
+    if (frames < 2) return Error{ErrorKind::bad_input, "a path needs two frames", "--frames", "Give more"};
     Eigen::Vector3d pivot = Eigen::Vector3d::Zero();
     for (const CameraPlan::Stop& stop : plan.stops) pivot += stop.at / static_cast<double>(plan.stops.size());
     return recon::through(path, pivot, size, frames);

@@ -36,8 +36,8 @@ class Scene {
   Status go_to(Seconds time, recon::Pool& pool);
   [[nodiscard]] ScenePicture picture(const recon::CameraModel& camera, const PictureOptions& options,
                                      recon::Pool& pool) const;
-  /// The file's cameras, `frames` of them along a path; one where it has one place. Errors: a path of one frame;
-  /// no flame at the beginning to move around.
+  /// The file's cameras, `frames` of them along a path; one where it has one place. Errors: a path of one
+  /// frame; no flame at the beginning to move around.
   [[nodiscard]] Result<std::vector<recon::CameraModel>> cameras(ImageSize size, int frames) const;
 
   [[nodiscard]] std::size_t triangles() const { return triangles_; }

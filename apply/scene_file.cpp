@@ -63,8 +63,7 @@ class Fields {
   }
   fs::path file(const std::string& key, const fs::path& folder) {
     const Json& found = need(key);
-    if (!found.is_string() || found.get_ref<const std::string&>().empty())
-      refuse("isn't a path", path(key));
+    if (!found.is_string() || found.get_ref<const std::string&>().empty()) refuse("isn't a path", path(key));
     const auto& name = found.get_ref<const std::string&>();
     if (name.find('\0') != std::string::npos) refuse("isn't a path", path(key));
     return folder / name;
@@ -86,8 +85,7 @@ class Fields {
   static Eigen::Vector3d three_in(const Json& json, const std::string& key, double least, double most) {
     if (!json.is_array() || json.size() != 3) refuse("isn't three numbers", key, "Give [x, y, z]");
     Eigen::Vector3d out;
-    for (int a = 0; a < 3; ++a)
-      out[a] = number_in(json[static_cast<std::size_t>(a)], key, least, most);
+    for (int a = 0; a < 3; ++a) out[a] = number_in(json[static_cast<std::size_t>(a)], key, least, most);
     return out;
   }
 

@@ -22,14 +22,16 @@ namespace emberlock::apply {
 //                                        --frames`: its frame-N one after the other
 //                "position": [0, 0, 0],  where the result's origin stands
 //                "rotation": [0, 0, 0],  degrees around the world's x, then y, then z
-//                "scale": 1,             its pictures keep their brightness: what it emits and absorbs a metre
+//                "scale": 1,             its pictures keep their brightness: what it emits and absorbs a
+//                metre
 //                                        is divided by it
 //                "mirror": "none",       x, y or z: that axis of the result is turned round, before all else
 //                "brightness": 1,        factor of its light
 //                "shift": 0,             s: it starts so much later
 //                "rate": 24,             of its frames, a second
 //                "frames": "loop"}],     or once: there is nothing before the first frame and after the last
-//    "geometry": [{"file": PATH,         .gltf or .glb; its y axis becomes the world's z, its z the world's -y
+//    "geometry": [{"file": PATH,         .gltf or .glb; its y axis becomes the world's z, its z the world's
+//    -y
 //                  "position", "rotation", "scale": as above}],
 //    "camera": {"from": [x, y, z], "look_at": [x, y, z]}, or a path through several places:
 //              {"stops": [{"from", "look_at"}, ...]}, or once around:
@@ -76,8 +78,8 @@ struct SceneFile {
   std::array<double, 3> background = {};  ///< grey levels
 };
 
-/// The scene that a text describes; its paths begin with `folder`. Errors: bad_input, with the key: what can't
-/// be read, is out of its range, or isn't known.
+/// The scene that a text describes; its paths begin with `folder`. Errors: bad_input, with the key: what
+/// can't be read, is out of its range, or isn't known.
 Result<SceneFile> parse_scene(std::string_view text, const std::string& where,
                               const std::filesystem::path& folder);
 /// The same of a file. Errors: those of read_file() too.

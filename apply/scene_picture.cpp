@@ -37,9 +37,8 @@ class PixelDraws {
   [[nodiscard]] SurfaceLight::Draw light(int sample) const {
     const std::uint64_t first = 2 + 8 * static_cast<std::uint64_t>(sample);
     const auto spread = [&](std::uint64_t i) { return (sample + number(first + i)) / samples_; };
-    return {spread(0),
-            {number(first + 1), number(first + 2), number(first + 3)},
-            {spread(4), number(first + 5)}};
+    return {
+        spread(0), {number(first + 1), number(first + 2), number(first + 3)}, {spread(4), number(first + 5)}};
   }
 
  private:
@@ -54,7 +53,11 @@ class PixelTracer {
  public:
   PixelTracer(const std::vector<const Flame*>& flames, const Surroundings& around,
               const recon::CameraModel& camera, const PictureOptions& options, recon::Pool& pool)
-      : flames_(flames), around_(around), camera_(camera), options_(options), lights_(flames, around.surfaces) {
+      : flames_(flames),
+        around_(around),
+        camera_(camera),
+        options_(options),
+        lights_(flames, around.surfaces) {
     views_.reserve(flames.size());
     for (const Flame* flame : flames) views_.push_back(flame->seen_by(camera, options.step, pool));
   }
@@ -64,13 +67,14 @@ class PixelTracer {
     RayLight seen, nearby;
   };
   void operator()(int x, int y, ScenePicture& picture, Scratch& scratch) const {
-    const std::size_t pixel = static_cast<std::size_t>(y) * static_cast<std::size_t>(picture.light.size.width) +
-                              static_cast<std::size_t>(x);
+    const std::size_t pixel =
+        static_cast<std::size_t>(y) * static_cast<std::size_t>(picture.light.size.width) +
+        static_cast<std::size_t>(x);
     scratch.seen.clear();
     for (std::size_t f = 0; f < flames_.size(); ++f) flames_[f]->add_steps(views_[f], pixel, scratch.seen);
     scratch.seen.merge();
-    const Means means = around_.surfaces.empty() ? without_surfaces(scratch.seen)
-                                                 : sampled(x, y, pixel, scratch);
+    const Means means =
+        around_.surfaces.empty() ? without_surfaces(scratch.seen) : sampled(x, y, pixel, scratch);
     for (std::size_t c = 0; c < 3; ++c)
       picture.light.rgb[3 * pixel + c] = static_cast<float>(means.light[static_cast<Eigen::Index>(c)]);
     picture.opacity[pixel] = static_cast<float>(std::clamp(means.opacity, 0.0, 1.0));
@@ -112,8 +116,7 @@ class PixelTracer {
     }
     means.light /= options_.samples;
     means.opacity /= options_.samples;
-    if (options_.samples > 1)
-      means.error = std::sqrt(squares / (options_.samples - 1) / options_.samples);
+    if (options_.samples > 1) means.error = std::sqrt(squares / (options_.samples - 1) / options_.samples);
     return means;
   }
 
@@ -135,7 +138,8 @@ class PixelTracer {
 }  // namespace
 
 ScenePicture scene_picture(const std::vector<const Flame*>& flames, const Surroundings& around,
-                           const recon::CameraModel& camera, const PictureOptions& options, recon::Pool& pool) {
+                           const recon::CameraModel& camera, const PictureOptions& options,
+                           recon::Pool& pool) {
   const ImageSize size = camera.intrinsics.size;
   ScenePicture picture{recon::RadianceImage(size), {}, {}};
   picture.opacity.resize(picture.light.rgb.size() / 3);

@@ -66,17 +66,16 @@ Eigen::Vector3d SurfaceLight::from_nearby(const Eigen::Vector3d& place, const Ei
   const double radius = std::sqrt(draw.towards[0]);
   const double angle = 2 * std::numbers::pi * draw.towards[1];
   const Eigen::Vector3d across = normal.unitOrthogonal();
-  const Eigen::Vector3d direction = radius * (std::cos(angle) * across + std::sin(angle) * normal.cross(across)) +
-                                    std::sqrt(1 - draw.towards[0]) * normal;
+  const Eigen::Vector3d direction =
+      radius * (std::cos(angle) * across + std::sin(angle) * normal.cross(across)) +
+      std::sqrt(1 - draw.towards[0]) * normal;
   scratch.clear();
   for (const Flame* f : flames_)
     f->add_coarse_steps(place, direction, f->near(place) ? Flame::Glow::shown : Flame::Glow::hidden, scratch);
   scratch.merge();
   const std::optional<Surfaces::Hit> hit = surfaces_.first(place, direction, clear_of_surface(place));
-  const recon::Rgba radiance =
-      hit ? scratch.up_to(static_cast<float>(hit->distance)) : scratch.all();
-  return std::numbers::pi *
-         Eigen::Vector3f(radiance.c[0], radiance.c[1], radiance.c[2]).cast<double>();
+  const recon::Rgba radiance = hit ? scratch.up_to(static_cast<float>(hit->distance)) : scratch.all();
+  return std::numbers::pi * Eigen::Vector3f(radiance.c[0], radiance.c[1], radiance.c[2]).cast<double>();
 }
 
 }  // namespace emberlock::apply

@@ -15,12 +15,12 @@ namespace emberlock::apply {
 
 /// The light of flames that falls on surfaces: one random sample of the irradiance
 ///   E(x) = Int S(y) T(x, y) V(x, y) max(0, n . w) / |y - x|^2 dy,  w = (y - x) / |y - x|
-/// over all flames; T is the smoke's transmittance, V whether no surface stands between. Its mean is E, but for
-/// what the coarse grids of the flames leave out.
-///   Of flames that are not near x, a voxel is chosen with a chance proportional to its power (its integral of
-///   S), and a place evenly in it. Of those that x is near, where 1 / |y - x|^2 has no bound, all that arrives
-///   from one direction, chosen with a chance proportional to its cosine (Malley's method, Pharr, Jakob and
-///   Humphreys, "Physically Based Rendering", section 13.6.3).
+/// over all flames; T is the smoke's transmittance, V whether no surface stands between. Its mean is E, but
+/// for what the coarse grids of the flames leave out.
+///   Of flames that are not near x, a voxel is chosen with a chance proportional to its power (its integral
+///   of S), and a place evenly in it. Of those that x is near, where 1 / |y - x|^2 has no bound, all that
+///   arrives from one direction, chosen with a chance proportional to its cosine (Malley's method, Pharr,
+///   Jakob and Humphreys, "Physically Based Rendering", section 13.6.3).
 class SurfaceLight {
  public:
   /// Both must outlive it.

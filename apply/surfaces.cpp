@@ -85,11 +85,11 @@ std::optional<Surfaces::Hit> Surfaces::first(const Eigen::Vector3d& origin, cons
   query.hit.geomID = query.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
   rtcIntersect1(embree_->scene, &context, &query);
   if (query.hit.geomID == RTC_INVALID_GEOMETRY_ID) return std::nullopt;
-  const Eigen::Vector3d normal = Eigen::Vector3f(query.hit.Ng_x, query.hit.Ng_y, query.hit.Ng_z)
-                                     .cast<double>()
-                                     .normalized();
+  const Eigen::Vector3d normal =
+      Eigen::Vector3f(query.hit.Ng_x, query.hit.Ng_y, query.hit.Ng_z).cast<double>().normalized();
   const Mesh& mesh = embree_->mesh;
-  return Hit{static_cast<double>(query.ray.tfar), normal.dot(direction) > 0 ? Eigen::Vector3d(-normal) : normal,
+  return Hit{static_cast<double>(query.ray.tfar),
+             normal.dot(direction) > 0 ? Eigen::Vector3d(-normal) : normal,
              &mesh.materials[mesh.material[query.hit.primID]]};
 }
 

@@ -3,7 +3,8 @@
 
 namespace emberlock::recon {
 
-std::vector<Rgba> cropped_source(const Volume& volume, const CroppedHull& crop, Extinction::Model extinction) {
+std::vector<Rgba> cropped_source(const Volume& volume, const CroppedHull& crop,
+                                 Extinction::Model extinction) {
   const Grid& c = crop.hull.grid;
   std::vector<Rgba> out(c.size());
   for (int k = 0; k < c.nz; ++k) {

@@ -14,8 +14,8 @@
 
 namespace emberlock::test {
 
-/// A volume whose values are a function of the key point: emission in lanes 0..2, extinction in lane 3; without
-/// extinction anywhere, it has none.
+/// A volume whose values are a function of the key point: emission in lanes 0..2, extinction in lane 3;
+/// without extinction anywhere, it has none.
 using Values = std::function<std::array<float, 4>(int i, int j, int k)>;
 inline recon::Volume volume_of(const recon::Grid& grid, const Values& values) {
   recon::Volume volume;
@@ -47,8 +47,8 @@ inline Values uneven(std::uint64_t seed, double light, double extinction) {
   };
 }
 
-/// Light of one key point in the middle of 2 x 2 x 2 voxels of a centimetre around the origin: its integral over
-/// the volume is 1e-6 m3 times its source.
+/// Light of one key point in the middle of 2 x 2 x 2 voxels of a centimetre around the origin: its integral
+/// over the volume is 1e-6 m3 times its source.
 inline recon::Volume spark(float source) {
   return volume_of({{-0.01F, -0.01F, -0.01F}, 0.01F, 3, 3, 3}, [=](int i, int j, int k) {
     const float s = i == 1 && j == 1 && k == 1 ? source : 0;
@@ -67,8 +67,8 @@ inline void add_square(apply::Mesh& mesh, double x, double y, double height, dou
                        const apply::Material& material = {}) {
   const auto first = static_cast<std::uint32_t>(mesh.vertices.size());
   for (const auto& [sx, sy] : {std::pair(-1, -1), {1, -1}, {1, 1}, {-1, 1}})
-    mesh.vertices.push_back({static_cast<float>(x + sx * half), static_cast<float>(y + sy * half),
-                             static_cast<float>(height)});
+    mesh.vertices.push_back(
+        {static_cast<float>(x + sx * half), static_cast<float>(y + sy * half), static_cast<float>(height)});
   mesh.triangles.push_back({first, first + 1, first + 2});
   mesh.triangles.push_back({first, first + 2, first + 3});
   mesh.material.insert(mesh.material.end(), 2, static_cast<std::uint32_t>(mesh.materials.size()));

@@ -1,12 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 // Closed forms of light among surfaces, and what scenes without them have to be.
+#include "apply/scene_picture.h"
+
 #include <algorithm>
 #include <cmath>
 #include <numbers>
 
 #include <gtest/gtest.h>
 
-#include "apply/scene_picture.h"
 #include "apply/surface_light.h"
 #include "recon/render/render.h"
 #include "tests/support/camera_at.h"
@@ -122,7 +123,8 @@ TEST_F(ScenePictureTest, BehindAPlateTheFloorIsDarkAndTheFlameHidden) {
   const Flame light = flame(spark(2e9F), moved(0, 0, 0.8));
   // From below the plate, the floor beneath it and the plate's dark side.
   for (const double aim : {0.0, 0.35}) {
-    const ScenePicture below = picture({&light}, scene, camera_at({0.5, 0, 0.2}, {0.1, 0, aim}, kSmall, 60), 4);
+    const ScenePicture below =
+        picture({&light}, scene, camera_at({0.5, 0, 0.2}, {0.1, 0, aim}, kSmall, 60), 4);
     for (const float v : below.light.rgb) ASSERT_EQ(v, 0);
   }
 }
@@ -131,8 +133,9 @@ TEST_F(ScenePictureTest, ASlabOfSmokeShadesByItsDepth) {
   const Surfaces floor = built(floor_of());
   constexpr double kSigma = 6;
   // 2 m wide, 0.25 m thick, between 0.4 and 0.65 m.
-  const Flame smoke = flame(volume_of(grid_of(33, 33, 5, 0.0625F, -1, -1, 0.4F),
-                                      [](int, int, int) { return std::array<float, 4>{0, 0, 0, kSigma}; }));
+  const Flame smoke = flame(volume_of(grid_of(33, 33, 5, 0.0625F, -1, -1, 0.4F), [](int, int, int) {
+    return std::array<float, 4>{0, 0, 0, kSigma};
+  }));
   const Flame light = flame(spark(2e9F), moved(0, 0, 1));
   const recon::CameraModel camera = camera_at({0.7, 0.2, 0.3}, {0.2, 0, 0}, kSmall, 40);
   const ScenePicture seen = picture({&light, &smoke}, floor, camera, 128);
@@ -149,11 +152,10 @@ TEST_F(ScenePictureTest, WithoutSurfacesItIsWhatRenderShows) {
   const Surfaces none = built({});
   const recon::CameraModel camera = camera_at({0.5, 0.1, 0.2}, {0.08, 0.06, 0.09}, kSmall, 50);
   for (const double extinction : {0.0, 20.0}) {
-    recon::Volume volume =
-        volume_of(grid_of(17, 14, 20, 0.01F, 0, 0, 0),
-                  [values = uneven(1, 1000, extinction)](int i, int j, int k) {
-                    return (i + j + k) % 5 == 0 && i < 12 ? values(i, j, k) : std::array<float, 4>{};
-                  });
+    recon::Volume volume = volume_of(
+        grid_of(17, 14, 20, 0.01F, 0, 0, 0), [values = uneven(1, 1000, extinction)](int i, int j, int k) {
+          return (i + j + k) % 5 == 0 && i < 12 ? values(i, j, k) : std::array<float, 4>{};
+        });
     const Flame alone = flame(volume);
     const ScenePicture seen = picture({&alone}, none, camera);
     EXPECT_LT(difference(rendered(volume, camera), seen.light), 1e-5);
@@ -172,8 +174,8 @@ TEST_F(ScenePictureTest, SmokeThatScattersItsOwnLightShowsItAsRenderDoes) {
   EXPECT_LT(difference(expected, picture({&alone}, built({}), camera).light), 2e-6);
 }
 
-/// Against the volume with its key points put where the placement puts them: mirrored along x, turned by a right
-/// angle around z, twice as large, moved.
+/// Against the volume with its key points put where the placement puts them: mirrored along x, turned by a
+/// right angle around z, twice as large, moved.
 TEST_F(ScenePictureTest, AFlameThatIsPlacedIsItsVolumeElsewhere) {
   const test::Values values = uneven(5, 1000, 10);
   const recon::Volume volume = volume_of(grid_of(9, 12, 15, 0.01F, 0, 0, 0), values);

@@ -9,6 +9,7 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
+#include "apply/gltf_file.h"
 #include "apply/unreadable.h"
 #include "base/file.h"
 #include "base/nesting.h"
@@ -192,6 +193,28 @@ SceneFile scene_of(const Json& json, const fs::path& folder) {
   return scene;
 }
 
+Result<SceneFile> scene_in_gltf(const fs::path& file) {
+  Mesh mesh;  // read again where it is shown
+  EMBERLOCK_ASSIGN_OR_RETURN(const GltfScene found, read_gltf(file, {}, mesh));
+  if (found.flames.empty() || found.flames.size() > kMostFlames)
+    return Error{
+        ErrorKind::bad_input, fmt::format("names {} flames", found.flames.size()), file.string(),
+        fmt::format("Give 1 to {} nodes the custom property emberlock_flame, a result's path; or a scene "
+                    "file that names both",
+                    kMostFlames)};
+  SceneFile scene;
+  for (const GltfScene::Flame& flame : found.flames)
+    scene.flames.push_back({file.parent_path() / flame.result, flame.world_from_flame});
+  scene.geometry.push_back({file, {}});
+  if (found.cameras.empty()) return scene;
+  const GltfScene::Camera& camera = found.cameras.front();
+  const Placement& place = camera.world_from_camera;
+  scene.camera.stops.push_back({place.translation, place.translation + place.rotation.col(2)});
+  scene.camera.up = -place.rotation.col(1);
+  scene.camera.field_of_view = camera.height;
+  return scene;
+}
+
 }  // namespace
 
 Result<SceneFile> parse_scene(std::string_view text, const std::string& where, const fs::path& folder) try {
@@ -204,6 +227,7 @@ Result<SceneFile> parse_scene(std::string_view text, const std::string& where, c
 }
 
 Result<SceneFile> read_scene(const fs::path& file) {
+  if (file.extension() == ".glb" || file.extension() == ".gltf") return scene_in_gltf(file);
   constexpr std::size_t kMostBytes = std::size_t{16} << 20;
   EMBERLOCK_ASSIGN_OR_RETURN(const std::string text, read_file(file, kMostBytes));
   return parse_scene(text, file.string(), file.parent_path());

@@ -82,7 +82,9 @@ struct SceneFile {
 /// can't be read, is out of its range, or isn't known.
 Result<SceneFile> parse_scene(std::string_view text, const std::string& where,
                               const std::filesystem::path& folder);
-/// The same of a file. Errors: those of read_file() too.
+/// The same of a file. Errors: those of read_file() too. Of a .glb or .gltf file: its triangles, the flames
+/// that its nodes name and place (`emberlock_flame` in their extras, as Blender exports custom properties),
+/// and its first camera, or an orbit; errors: those of read_gltf(), and no flame.
 Result<SceneFile> read_scene(const std::filesystem::path& file);
 
 }  // namespace emberlock::apply

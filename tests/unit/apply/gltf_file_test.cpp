@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
+#include "apply/gltf_file.h"
+
 #include <fstream>
 #include <limits>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "apply/gltf_file.h"
 #include "tests/support/gltf_writer.h"
 #include "tests/support/recording.h"
 
@@ -34,7 +35,8 @@ class GltfFileTest : public testing::Test {
     EXPECT_THAT(scene.error().message(), HasSubstr("room.gltf"));
   }
   void expect_vertex(std::size_t i, float x, float y, float z) {
-    EXPECT_THAT(mesh_.vertices.at(i), ElementsAre(FloatNear(x, 1e-5F), FloatNear(y, 1e-5F), FloatNear(z, 1e-5F)));
+    EXPECT_THAT(mesh_.vertices.at(i),
+                ElementsAre(FloatNear(x, 1e-5F), FloatNear(y, 1e-5F), FloatNear(z, 1e-5F)));
   }
 
   test::TempFolder temp_;
@@ -84,16 +86,19 @@ TEST_F(GltfFileTest, ASecondFileKeepsItsOwnMaterials) {
 
 TEST_F(GltfFileTest, FlamesAndCamerasAreTaken) {
   GltfText gltf;
-  gltf.nodes = R"([{"mesh": 0}, {"translation": [1, 2, 3], "scale": [2, 2, 2], "extras": {"emberlock_flame": "fire"}},
+  gltf.nodes =
+      R"([{"mesh": 0}, {"translation": [1, 2, 3], "scale": [2, 2, 2], "extras": {"emberlock_flame": "fire"}},
                    {"camera": 0, "translation": [0, 5, 0]}])";
   gltf.roots = "[0, 1, 2]";
-  gltf.further = R"("materials": [{}], "cameras": [{"type": "perspective", "perspective": {"yfov": 0.7, "znear": 0.1}}])";
+  gltf.further =
+      R"("materials": [{}], "cameras": [{"type": "perspective", "perspective": {"yfov": 0.7, "znear": 0.1}}])";
   const auto scene = read(gltf.text());
   ASSERT_TRUE(scene.ok()) << scene.error().message();
   ASSERT_EQ(scene->flames.size(), 1U);
   EXPECT_EQ(scene->flames[0].result, "fire");
   // Its own z is up, as the world's.
-  EXPECT_TRUE((scene->flames[0].world_from_flame * Eigen::Vector3d(0, 0, 1)).isApprox(Eigen::Vector3d(1, -3, 4)));
+  EXPECT_TRUE(
+      (scene->flames[0].world_from_flame * Eigen::Vector3d(0, 0, 1)).isApprox(Eigen::Vector3d(1, -3, 4)));
   ASSERT_EQ(scene->cameras.size(), 1U);
   // It looks along the file's -z, which is the world's y; the picture's down is the world's.
   const Placement& camera = scene->cameras[0].world_from_camera;
@@ -158,7 +163,8 @@ TEST_F(GltfFileTest, RefusesWhatItCannotShow) {
   gltf = {};
   gltf.nodes = R"([{"scale": [1, 2, 1], "extras": {"emberlock_flame": "fire"}}])";
   expect_refused(gltf.text(), "stretched");
-  for (const char* text : {"", "{", "[]", "{}", "glTF", R"({"asset": {"version": "2.0"}})"}) expect_refused(text, "");
+  for (const char* text : {"", "{", "[]", "{}", "glTF", R"({"asset": {"version": "2.0"}})"})
+    expect_refused(text, "");
   expect_refused(std::string(100000, '['), "");
 }
 

@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
+#include "apply/scene_file.h"
+
 #include <cmath>
 #include <fstream>
 #include <numbers>
@@ -8,7 +10,6 @@
 #include <gtest/gtest.h>
 
 #include "apply/scene.h"
-#include "apply/scene_file.h"
 #include "tests/support/recording.h"
 
 namespace emberlock::apply {
@@ -18,8 +19,8 @@ namespace fs = std::filesystem;
 using testing::HasSubstr;
 
 Result<SceneFile> scene_with(const std::string& flame, const std::string& rest = {}) {
-  return parse_scene(R"({"format": "emberlock scene", "version": 1, "flames": [{"result": "fire")" + flame + "}]" +
-                         rest + "}",
+  return parse_scene(R"({"format": "emberlock scene", "version": 1, "flames": [{"result": "fire")" + flame +
+                         "}]" + rest + "}",
                      "s.json", "/here");
 }
 std::string error_of(const Result<SceneFile>& scene) {
@@ -69,7 +70,8 @@ TEST(SceneFile, ReadsCamerasGeometryAndColours) {
 }
 
 TEST(SceneFile, SaysWhichKeyCannotBeUsed) {
-  EXPECT_THAT(error_of(scene_with(R"(, "brightnes": 2)")), HasSubstr("s.json: flames[0].brightnes: isn't known"));
+  EXPECT_THAT(error_of(scene_with(R"(, "brightnes": 2)")),
+              HasSubstr("s.json: flames[0].brightnes: isn't known"));
   EXPECT_THAT(error_of(scene_with(R"(, "scale": 0)")), HasSubstr("flames[0].scale: is out of range"));
   EXPECT_THAT(error_of(scene_with(R"(, "scale": "big")")), HasSubstr("isn't a number"));
   EXPECT_THAT(error_of(scene_with(R"(, "position": [1, 2])")), HasSubstr("isn't three numbers"));
@@ -79,12 +81,14 @@ TEST(SceneFile, SaysWhichKeyCannotBeUsed) {
   EXPECT_THAT(error_of(scene_with("", R"(, "camera": {"from": [0, 0, 1], "look_at": [0, 0, 0]})")),
               HasSubstr("looks along the axis that is up"));
   EXPECT_THAT(error_of(scene_with("", R"(, "camera": {"stops": []})")), HasSubstr("needs two stops"));
-  EXPECT_THAT(error_of(scene_with("", R"(, "camera": {"orbit": {"elevation": 90}})")), HasSubstr("elevation"));
+  EXPECT_THAT(error_of(scene_with("", R"(, "camera": {"orbit": {"elevation": 90}})")),
+              HasSubstr("elevation"));
   EXPECT_THAT(error_of(scene_with("", R"(, "camera": 3)")), HasSubstr("isn't an object"));
   EXPECT_THAT(error_of(scene_with("", R"(, "ambient": [-1, 0, 0])")), HasSubstr("ambient"));
-  for (const char* text : {"", "[]", "{", "{}", R"({"format": "emberlock scene", "version": 2, "flames": []})",
-                           R"({"format": "emberlock scene", "version": 1, "flames": []})",
-                           R"({"format": "emberlock scene", "version": 1, "flames": [{"result": ""}]})"})
+  for (const char* text :
+       {"", "[]", "{", "{}", R"({"format": "emberlock scene", "version": 2, "flames": []})",
+        R"({"format": "emberlock scene", "version": 1, "flames": []})",
+        R"({"format": "emberlock scene", "version": 1, "flames": [{"result": ""}]})"})
     EXPECT_FALSE(parse_scene(text, "s.json", "").ok()) << text;
   EXPECT_FALSE(parse_scene(std::string(100000, '['), "s.json", "").ok());
 }

@@ -277,7 +277,7 @@ std::string_view json_of(std::string_view bytes) {
   return bytes.substr(kHeader, length);
 }
 
-tinygltf::Model parse_gltf(const std::string& bytes, const fs::path& file) {
+tinygltf::Model model_of(const std::string& bytes, const fs::path& file) {
   tinygltf::TinyGLTF loader;
   loader.SetImageLoader([](tinygltf::Image*, int, std::string*, std::string*, int, int, const unsigned char*,
                            int, void*) { return true; },
@@ -303,10 +303,15 @@ tinygltf::Model parse_gltf(const std::string& bytes, const fs::path& file) {
 
 }  // namespace
 
-Result<GltfScene> read_gltf(const fs::path& file, const Placement& world_from_file, Mesh& mesh) try {
+Result<GltfScene> read_gltf(const fs::path& file, const Placement& world_from_file, Mesh& mesh) {
   EMBERLOCK_ASSIGN_OR_RETURN(const std::string bytes, read_file(file));
+  return parse_gltf(bytes, file, world_from_file, mesh);
+}
+
+Result<GltfScene> parse_gltf(const std::string& bytes, const fs::path& file, const Placement& world_from_file,
+                             Mesh& mesh) try {
   EMBERLOCK_RETURN_IF_ERROR(check_json_nesting(json_of(bytes), file.string()));
-  return GltfReader(parse_gltf(bytes, file), world_from_file, mesh).found();
+  return GltfReader(model_of(bytes, file), world_from_file, mesh).found();
 } catch (const Unreadable& e) {
   return in_file(e.error, file.string());
 } catch (const std::exception& e) {

@@ -51,5 +51,8 @@ struct GltfScene {
 /// missing or short buffer, indices out of range, a node that is reached twice (a cycle too), values that
 /// aren't finite, nothing but points or lines, more than kMostTriangles. `mesh` is undefined after an error.
 Result<GltfScene> read_gltf(const std::filesystem::path& file, const Placement& world_from_file, Mesh& mesh);
+/// The same of what the file holds; buffers beside it are looked for in its folder.
+Result<GltfScene> parse_gltf(const std::string& bytes, const std::filesystem::path& file,
+                             const Placement& world_from_file, Mesh& mesh);
 
 }  // namespace emberlock::apply

@@ -43,16 +43,16 @@ Picture picture_of(const recon::RadianceImage& light, const std::vector<float>& 
   return {recon::to_rgb8(bare), std::move(covers)};
 }
 
-Result<FrameFiles> FrameFiles::create(const FrameFormat& format, const fs::path& folder, const std::string& name,
-                                      ImageSize size) {
+Result<FrameFiles> FrameFiles::create(const FrameFormat& format, const fs::path& folder,
+                                      const std::string& name, ImageSize size) {
   FrameFiles files(folder);
   if (!format.video()) return files;
   using Coding = session::VideoWriter::Coding;
   const bool lossless = format.format == "ffv1";
-  EMBERLOCK_ASSIGN_OR_RETURN(
-      files.video_, session::VideoWriter::create(folder / (name + (lossless ? ".mkv" : ".mp4")),
-                                                 {size, PixelFormat::rgb8, 8}, Hertz(format.rate), 0,
-                                                 lossless ? Coding::lossless : Coding::for_players));
+  EMBERLOCK_ASSIGN_OR_RETURN(files.video_,
+                             session::VideoWriter::create(folder / (name + (lossless ? ".mkv" : ".mp4")),
+                                                          {size, PixelFormat::rgb8, 8}, Hertz(format.rate), 0,
+                                                          lossless ? Coding::lossless : Coding::for_players));
   return files;
 }
 

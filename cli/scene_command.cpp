@@ -132,10 +132,11 @@ Status draw_scene(const SceneArguments& a) try {
 void add_scene(CLI::App& app) {
   auto arguments = std::make_shared<SceneArguments>();
   SceneArguments& a = *arguments;
-  CLI::App* verb =
-      app.add_subcommand("scene", "Pictures or a video of flames among surfaces that they light and hide behind");
-  verb->add_option("SCENE", a.scene,
-                   "A scene file (apply/README.md), or a .glb or .gltf whose nodes name results as emberlock_flame")
+  CLI::App* verb = app.add_subcommand(
+      "scene", "Pictures or a video of flames among surfaces that they light and hide behind");
+  verb->add_option(
+          "SCENE", a.scene,
+          "A scene file (apply/README.md), or a .glb or .gltf whose nodes name results as emberlock_flame")
       ->required();
   verb->add_option("--out", a.out, "Folder for frame-0000.png and so on, or for the video")->required();
   verb->add_option("--image", a.image, "Size of the pictures")->capture_default_str();
@@ -143,7 +144,8 @@ void add_scene(CLI::App& app) {
       ->check(CLI::Range(1, 100000));
   verb->add_option("--rate", a.format.rate, "Frames a second: of a video, and of time in the scene")
       ->capture_default_str();
-  verb->add_option("--samples", a.samples, "Of each pixel: four times as many halve the noise of lit surfaces")
+  verb->add_option("--samples", a.samples,
+                   "Of each pixel: four times as many halve the noise of lit surfaces")
       ->check(CLI::Range(1, 65536))
       ->capture_default_str();
   verb->add_option("--light-voxels", a.light_voxels,
@@ -151,9 +153,10 @@ void add_scene(CLI::App& app) {
       ->check(CLI::Range(4, 256))
       ->capture_default_str();
   verb->add_option("--seed", a.seed, "Of the random numbers")->capture_default_str();
-  verb->add_option("--format", a.format.format,
-                   "png; exr: 32 bits, R, G, B, the opacity A and the noise `error`; mp4: for any player; ffv1: "
-                   "lossless, in Matroska")
+  verb->add_option(
+          "--format", a.format.format,
+          "png; exr: 32 bits, R, G, B, the opacity A and the noise `error`; mp4: for any player; ffv1: "
+          "lossless, in Matroska")
       ->check(CLI::IsMember({"png", "exr", "mp4", "ffv1"}))
       ->capture_default_str();
   verb->add_flag("--transparent", a.transparent, "PNG before nothing instead of the background");

@@ -7,6 +7,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "base/file.h"
 #include "tests/support/gltf_writer.h"
 #include "tests/support/recording.h"
 
@@ -145,6 +146,15 @@ TEST_F(GltfFileTest, RefusesBuffersThatAreMissingOrShort) {
   gltf = {};
   gltf.indices = {0, 1, 3};
   expect_refused(gltf.text(), "corner isn't there");
+}
+
+TEST_F(GltfFileTest, RefusesABinaryFileThatIsCutShortAnywhere) {
+  const auto whole = read_file(fs::path(EMBERLOCK_SOURCE_DIR) / "tests/fuzz/corpus/gltf_file/all.glb");
+  ASSERT_TRUE(whole.ok());
+  const auto scene = read(*whole);
+  ASSERT_TRUE(scene.ok()) << scene.error().message();
+  EXPECT_EQ(mesh_.triangles.size(), 1U);
+  for (std::size_t size = 0; size < whole->size(); size += 7) expect_refused(whole->substr(0, size), "");
 }
 
 TEST_F(GltfFileTest, RefusesWhatItCannotShow) {

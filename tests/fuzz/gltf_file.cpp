@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
+#include "apply/gltf_file.h"
+
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <cstdlib>
 #include <string>
-
-#include "apply/gltf_file.h"
 
 // A glTF file, text or binary: its triangles have finite corners that are there, and a material.
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {

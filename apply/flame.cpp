@@ -120,12 +120,13 @@ std::pair<double, double> Flame::inside(const Eigen::Vector3d& from, const Eigen
   return {enters, leaves};
 }
 
-bool Flame::near(const Eigen::Vector3d& place) const {
-  if (medium_.count == 0) return false;
+double Flame::close_by(const Eigen::Vector3d& place) const {
+  if (medium_.count == 0) return 0;
   const Eigen::Vector3d p = in_coarse_edges(place);
   const Eigen::Vector3d last(coarse_.grid.nx - 1, coarse_.grid.ny - 1, coarse_.grid.nz - 1);
-  const double margin = 0.25 * last.maxCoeff();
-  return (p.array() >= -margin).all() && (p.array() <= last.array() + margin).all();
+  constexpr double kMargin = 2;
+  if ((p.array() < -kMargin).any() || (p.array() > last.array() + kMargin).any()) return 0;
+  return static_cast<double>(coarse_.grid.edge) * world_from_flame_.scale;
 }
 
 double Flame::depth_between(const Eigen::Vector3d& a, const Eigen::Vector3d& b) const {
@@ -147,7 +148,7 @@ double Flame::depth_between(const Eigen::Vector3d& a, const Eigen::Vector3d& b) 
   return sum * length / steps;
 }
 
-void Flame::add_coarse_steps(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction, Glow glow,
+void Flame::add_coarse_steps(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction, double a,
                              RayLight& light) const {
   if (medium_.count == 0) return;
   const Eigen::Vector3d from = in_coarse_edges(origin);
@@ -161,10 +162,11 @@ void Flame::add_coarse_steps(const Eigen::Vector3d& origin, const Eigen::Vector3
   const recon::ShiningGrid grid = shining(coarse_);
   for (int i = 0; i < steps; ++i) {
     const double t = enters + (i + 0.5) * step;
-    recon::Rgba shine = static_cast<float>(edges) * at_place(grid, from + t * along);
-    if (glow == Glow::hidden) shine = recon::Rgba{{0, 0, 0, shine.c[3]}};
+    const recon::Rgba shine = static_cast<float>(edges) * at_place(grid, from + t * along);
+    recon::Rgba share = static_cast<float>(a > 0 ? a * a / (t * t + a * a) : 0) * shine;
+    share.c[3] = shine.c[3];
     light.steps().push_back(
-        {static_cast<float>(enters + i * step), static_cast<float>(enters + (i + 1) * step), shine});
+        {static_cast<float>(enters + i * step), static_cast<float>(enters + (i + 1) * step), share});
   }
   light.end_flame();
 }

@@ -43,15 +43,15 @@ class Flame {
 
   // What surfaces see.
 
-  /// Whether a place is in the flame's box, or nearer to it than a quarter of its longest side: there the
-  /// light of its parts is too uneven to be taken from a few of them.
-  [[nodiscard]] bool near(const Eigen::Vector3d& place) const;
+  /// How much of the light of a part at distance r is taken along rays, and not from parts that are chosen by
+  /// their power: a^2 / (r^2 + a^2), with this a, metres: the coarse grid's edge, and 0 at places farther
+  /// from its box than two of them, where 1 / r^2 is bounded.
+  [[nodiscard]] double close_by(const Eigen::Vector3d& place) const;
   /// The optical depth between two places.
   [[nodiscard]] double depth_between(const Eigen::Vector3d& a, const Eigen::Vector3d& b) const;
-  /// As add_steps(), of any ray, by the coarse grid; `glows`: whether its light is put too, or its extinction
-  /// alone.
-  enum class Glow { shown, hidden };
-  void add_coarse_steps(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction, Glow glow,
+  /// As add_steps(), of any ray, by the coarse grid; of its light the share that close_by() says, of this a;
+  /// of its extinction all.
+  void add_coarse_steps(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction, double a,
                         RayLight& light) const;
 
   /// A voxel of the coarse grid that glows, and its power: the integral of its mean source over its volume,

@@ -8,6 +8,7 @@
 
 #include "apply/ray_light.h"
 #include "apply/surface_light.h"
+#include "base/quantity.h"
 #include "base/random.h"
 
 namespace emberlock::apply {
@@ -21,32 +22,21 @@ Eigen::Vector3d colour_of(const recon::Rgba& v) {
   return Eigen::Vector3f(v.c[0], v.c[1], v.c[2]).cast<double>();
 }
 
-/// The random numbers of one pixel. Those that choose where light comes from are spread evenly over the
-/// samples; places within the pixel are the R2 sequence (Roberts 2018), shifted at random.
-class PixelDraws {
+/// Places of a pixel's samples: the R2 sequence (Roberts 2018), shifted at random.
+class PlacesInPixel {
  public:
-  PixelDraws(std::uint64_t seed, std::uint64_t pixel, int samples)
-      : seed_(seed), pixel_(pixel), samples_(samples), shift_{number(0), number(1)} {}
-
-  [[nodiscard]] Eigen::Vector2d within_pixel(int sample) const {
+  PlacesInPixel(std::uint64_t seed, std::uint64_t pixel) {
+    constexpr std::uint64_t kBeyondSamples = ~std::uint64_t{0};
+    for (std::uint64_t a = 0; a < 2; ++a) shift_[a] = random_uniform(seed, pixel, kBeyondSamples - a);
+  }
+  [[nodiscard]] Eigen::Vector2d operator()(int sample) const {
     constexpr double kAcross = 0.7548776662466927;
     constexpr double kDown = 0.5698402909980532;
-    const auto whole = [](double v) { return v - std::floor(v); };
-    return {whole(shift_[0] + sample * kAcross), whole(shift_[1] + sample * kDown)};
-  }
-  [[nodiscard]] SurfaceLight::Draw light(int sample) const {
-    const std::uint64_t first = 2 + 8 * static_cast<std::uint64_t>(sample);
-    const auto spread = [&](std::uint64_t i) { return (sample + number(first + i)) / samples_; };
-    return {
-        spread(0), {number(first + 1), number(first + 2), number(first + 3)}, {spread(4), number(first + 5)}};
+    return {wrap_positive(shift_[0] + sample * kAcross, 1), wrap_positive(shift_[1] + sample * kDown, 1)};
   }
 
  private:
-  [[nodiscard]] double number(std::uint64_t i) const { return random_uniform(seed_, pixel_, i); }
-
-  std::uint64_t seed_, pixel_;
-  int samples_;
-  double shift_[2];
+  double shift_[2] = {};
 };
 
 class PixelTracer {
@@ -94,19 +84,19 @@ class PixelTracer {
   }
 
   [[nodiscard]] Means sampled(int x, int y, std::size_t pixel, Scratch& scratch) const {
-    const PixelDraws draws(options_.seed, pixel, options_.samples);
+    const PlacesInPixel places(options_.seed, pixel);
     Means means;
     double mean = 0;
     double squares = 0;  // of what differs from the mean (Welford 1962)
     for (int i = 0; i < options_.samples; ++i) {
-      const recon::Ray ray = camera_.ray(Eigen::Vector2d(x, y) + draws.within_pixel(i));
+      const recon::Ray ray = camera_.ray(Eigen::Vector2d(x, y) + places(i));
       const std::optional<Surfaces::Hit> hit = around_.surfaces.first(ray.origin, ray.direction);
       const recon::Rgba before =
           hit ? scratch.seen.up_to(static_cast<float>(hit->distance)) : scratch.seen.all();
       const double through = static_cast<double>(before.c[3]);
-      const Eigen::Vector3d behind =
-          hit ? shine(ray.origin + hit->distance * ray.direction, *hit, draws.light(i), scratch.nearby)
-              : vector_of(around_.background);
+      const Eigen::Vector3d behind = hit ? shine(ray.origin + hit->distance * ray.direction, *hit,
+                                                 {options_.seed, pixel, i, options_.samples}, scratch.nearby)
+                                         : vector_of(around_.background);
       const Eigen::Vector3d light = colour_of(before) + through * behind;
       means.light += light;
       means.opacity += hit ? 1 : 1 - through;

@@ -11,6 +11,10 @@
 namespace emberlock::apply {
 namespace {
 
+constexpr int kProposals = 8;
+constexpr int kFirstOfProposals = 2;  // of a draw's numbers; those before are the ray's
+static_assert(kFirstOfProposals + 5 * kProposals <= SurfaceLight::Draw::kEach);
+
 /// So far from a surface its own rounding ends, metres.
 double clear_of_surface(const Eigen::Vector3d& place) { return 1e-5 * (1 + place.cwiseAbs().maxCoeff()); }
 
@@ -31,47 +35,64 @@ SurfaceLight::SurfaceLight(const std::vector<const Flame*>& flames, const Surfac
 Eigen::Vector3d SurfaceLight::sample(const Eigen::Vector3d& place, const Eigen::Vector3d& normal,
                                      const Draw& draw, RayLight& scratch) const {
   if (emitters_.empty()) return Eigen::Vector3d::Zero();
-  const bool near =
-      std::any_of(flames_.begin(), flames_.end(), [&](const Flame* f) { return f->near(place); });
-  Eigen::Vector3d light = from_afar(place, normal, draw);
-  if (near) light += from_nearby(place, normal, draw, scratch);
+  const bool close =
+      std::any_of(flames_.begin(), flames_.end(), [&](const Flame* f) { return f->close_by(place) > 0; });
+  Eigen::Vector3d light = from_one_place(place, normal, draw);
+  if (close) light += along_a_ray(place, normal, draw, scratch);
   return light;
 }
 
-Eigen::Vector3d SurfaceLight::from_afar(const Eigen::Vector3d& place, const Eigen::Vector3d& normal,
-                                        const Draw& draw) const {
+SurfaceLight::Proposal SurfaceLight::proposed(const Eigen::Vector3d& place, const Eigen::Vector3d& normal,
+                                              double which, const Eigen::Vector3d& within) const {
   const double all = power_until_.back();
   const auto chosen = std::min(
-      static_cast<std::size_t>(std::upper_bound(power_until_.begin(), power_until_.end(), draw.voxel * all) -
+      static_cast<std::size_t>(std::upper_bound(power_until_.begin(), power_until_.end(), which * all) -
                                power_until_.begin()),
       emitters_.size() - 1);
-  const Emitter& emitter = emitters_[chosen];
-  const Flame& flame = *flames_[emitter.flame];
-  if (flame.near(place)) return Eigen::Vector3d::Zero();
+  const Flame& flame = *flames_[emitters_[chosen].flame];
   const double power = power_until_[chosen] - (chosen > 0 ? power_until_[chosen - 1] : 0);
-  const Flame::Sent sent = flame.sent(emitter.voxel, {draw.within[0], draw.within[1], draw.within[2]});
+  const Flame::Sent sent = flame.sent(emitters_[chosen].voxel, within);
   const Eigen::Vector3d towards = sent.place - place;
+  const double squared = towards.squaredNorm();
+  const double cosine = normal.dot(towards) / std::sqrt(squared);
+  if (!(cosine > 0)) return {sent.place};
+  const double a = flame.close_by(place);
+  return {sent.place, (all / power * cosine / (squared + a * a)) * sent.power};
+}
+
+Eigen::Vector3d SurfaceLight::from_one_place(const Eigen::Vector3d& place, const Eigen::Vector3d& normal,
+                                             const Draw& draw) const {
+  double sum = 0;
+  Proposal taken;
+  for (int i = 0; i < kProposals; ++i) {
+    const int first = kFirstOfProposals + 5 * i;
+    const Proposal one = proposed(place, normal, (i + draw.spread(first)) / kProposals,
+                                  {draw.number(first + 1), draw.number(first + 2), draw.number(first + 3)});
+    const double light = one.irradiance.sum();
+    sum += light;
+    if (light > 0 && draw.number(first + 4) * sum < light) taken = one;  // each with its share of the sum
+  }
+  if (!(sum > 0)) return Eigen::Vector3d::Zero();
+  const Eigen::Vector3d towards = taken.place - place;
   const double distance = towards.norm();
-  const double cosine = normal.dot(towards) / distance;
-  if (!(cosine > 0)) return Eigen::Vector3d::Zero();
   if (surfaces_.blocked(place, towards / distance, clear_of_surface(place), distance))
     return Eigen::Vector3d::Zero();
   double depth = 0;
-  for (const Flame* f : flames_) depth += f->depth_between(place, sent.place);
-  return (all / power * std::exp(-depth) * cosine / (distance * distance)) * sent.power;
+  for (const Flame* f : flames_) depth += f->depth_between(place, taken.place);
+  return (sum / (kProposals * taken.irradiance.sum()) * std::exp(-depth)) * taken.irradiance;
 }
 
-Eigen::Vector3d SurfaceLight::from_nearby(const Eigen::Vector3d& place, const Eigen::Vector3d& normal,
+Eigen::Vector3d SurfaceLight::along_a_ray(const Eigen::Vector3d& place, const Eigen::Vector3d& normal,
                                           const Draw& draw, RayLight& scratch) const {
-  const double radius = std::sqrt(draw.towards[0]);
-  const double angle = 2 * std::numbers::pi * draw.towards[1];
+  const double outwards = draw.spread(0);
+  const double radius = std::sqrt(outwards);
+  const double angle = 2 * std::numbers::pi * draw.number(1);
   const Eigen::Vector3d across = normal.unitOrthogonal();
   const Eigen::Vector3d direction =
       radius * (std::cos(angle) * across + std::sin(angle) * normal.cross(across)) +
-      std::sqrt(1 - draw.towards[0]) * normal;
+      std::sqrt(1 - outwards) * normal;
   scratch.clear();
-  for (const Flame* f : flames_)
-    f->add_coarse_steps(place, direction, f->near(place) ? Flame::Glow::shown : Flame::Glow::hidden, scratch);
+  for (const Flame* f : flames_) f->add_coarse_steps(place, direction, f->close_by(place), scratch);
   scratch.merge();
   const std::optional<Surfaces::Hit> hit = surfaces_.first(place, direction, clear_of_surface(place));
   const recon::Rgba radiance = hit ? scratch.up_to(static_cast<float>(hit->distance)) : scratch.all();

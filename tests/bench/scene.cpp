@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Writes a scene to time `emberlock scene` with, and to compare it with other renderers: three flames of 128^3 voxels (or another
-// number) in a room of 10380 triangles.
+// Writes a scene to time `emberlock scene` with, and to compare it with other renderers: three flames of
+// 128^3 voxels (or another number) in a room of 10380 triangles.
 //   bench_scene FOLDER [VOXELS]; emberlock scene FOLDER/scene.json --out PICTURE --image 1280x720 --samples 2
 #include <cstdio>
 #include <cstdlib>
@@ -24,12 +24,14 @@ namespace fs = std::filesystem;
 using Eigen::Vector3d;
 
 /// A wall of 36 x 36 squares from a corner along two edges.
-void add_wall(test::GltfText& gltf, const Vector3d& corner, const Vector3d& along, const Vector3d& across, int squares) {
+void add_wall(test::GltfText& gltf, const Vector3d& corner, const Vector3d& along, const Vector3d& across,
+              int squares) {
   const auto first = static_cast<int>(gltf.corners.size() / 3);
   for (int j = 0; j <= squares; ++j)
     for (int i = 0; i <= squares; ++i) {
       const Vector3d p = corner + along * i / squares + across * j / squares;
-      for (const double v : {p.x(), p.z(), -p.y()}) gltf.corners.push_back(static_cast<float>(v));  // y upwards
+      for (const double v : {p.x(), p.z(), -p.y()})
+        gltf.corners.push_back(static_cast<float>(v));  // y upwards
     }
   const auto put = [&](int i, int j) {
     gltf.indices.push_back(static_cast<std::uint16_t>(first + i + (squares + 1) * j));
@@ -53,11 +55,13 @@ std::string room() {
   add_wall(gltf, {-1, -1, 0}, 2 * y, 1.5 * z, kSquares);
   add_wall(gltf, {1, -1, 0}, 2 * y, 1.5 * z, kSquares);
   const Vector3d foot(0.15, -0.45, 0);
-  for (const auto& [corner, along] : {std::pair(foot, x), {foot + 0.1 * y, x}, {foot, y}, {foot + 0.1 * x, y}})
+  for (const auto& [corner, along] :
+       {std::pair(foot, x), {foot + 0.1 * y, x}, {foot, y}, {foot + 0.1 * x, y}})
     add_wall(gltf, corner, 0.1 * along, 0.8 * z, 1);
   add_wall(gltf, foot, 0.1 * x, 0.1 * y, 1);
   add_wall(gltf, foot + 0.8 * z, 0.1 * x, 0.1 * y, 1);
-  gltf.further = R"("materials": [{"pbrMetallicRoughness": {"baseColorFactor": [0.8, 0.7, 0.6, 1], "metallicFactor": 0}}])";
+  gltf.further =
+      R"("materials": [{"pbrMetallicRoughness": {"baseColorFactor": [0.8, 0.7, 0.6, 1], "metallicFactor": 0}}])";
   std::printf("%zu triangles\n", gltf.indices.size() / 3);
   return gltf.text();
 }
@@ -79,12 +83,14 @@ int main(int argc, char** argv) {
     fs::create_directories(folder / name);
     const Status written = recon::write_volume(truth.volume, folder / name / "volume.vdb");
     if (!written.ok()) return std::fprintf(stderr, "%s\n", written.error().message().c_str()), 1;
-    flames += fmt::format(R"({}{{"result": "{}", "position": [{}, {}, 0.3], "rotation": [0, 0, {}], "scale": 3}})",
-                          f > 0 ? ", " : "", name, 0.45 * (f - 1), 0.3 * (f == 1), 40 * f);
+    flames +=
+        fmt::format(R"({}{{"result": "{}", "position": [{}, {}, 0.3], "rotation": [0, 0, {}], "scale": 3}})",
+                    f > 0 ? ", " : "", name, 0.45 * (f - 1), 0.3 * (f == 1), 40 * f);
   }
   std::ofstream(folder / "room.gltf") << room();
-  std::ofstream(folder / "scene.json") << R"({"format": "emberlock scene", "version": 1, "flames": [)" << flames
-                                       << R"(], "geometry": [{"file": "room.gltf"}],
- "camera": {"from": [0.3, -2.4, 0.9], "look_at": [0, 0, 0.45]}})" << '\n';
+  std::ofstream(folder / "scene.json") << R"({"format": "emberlock scene", "version": 1, "flames": [)"
+                                       << flames << R"(], "geometry": [{"file": "room.gltf"}],
+ "camera": {"from": [0.3, -2.4, 0.9], "look_at": [0, 0, 0.45]}})"
+                                       << '\n';
   return 0;
 }

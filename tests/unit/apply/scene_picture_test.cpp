@@ -311,15 +311,10 @@ TEST_F(ScenePictureTest, SamplesOfTheIrradianceAreRightInTheMean) {
     const Surfaces away = built(std::move(nothing));
     const SurfaceLight unhidden(flames, away);
     RayLight scratch;
-    RandomStream random(1, static_cast<std::uint64_t>(1000 * x));
     Eigen::Vector3d sum = Eigen::Vector3d::Zero();
     constexpr int kSamples = 20000;
     for (int s = 0; s < kSamples; ++s)
-      sum += unhidden.sample(place, up,
-                             {(s + random.uniform()) / kSamples,
-                              {random.uniform(), random.uniform(), random.uniform()},
-                              {(s + random.uniform()) / kSamples, random.uniform()}},
-                             scratch);
+      sum += unhidden.sample(place, up, {1, static_cast<std::uint64_t>(1000 * x), s, kSamples}, scratch);
     EXPECT_NEAR(sum[0] / kSamples, expected, 0.02 * expected) << x;
   }
 }

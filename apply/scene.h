@@ -59,7 +59,7 @@ class Scene {
   Surfaces surfaces_;
   std::size_t triangles_ = 0;
   std::vector<std::string> notes_;
-  int light_voxels_ = 32;
+  int light_voxels_ = 0;
   std::vector<Player> players_;
 };
 

@@ -54,7 +54,8 @@ class PixelTracer {
 
   /// Rays of one thread.
   struct Scratch {
-    RayLight seen, nearby;
+    RayLight seen;
+    SurfaceLight::Scratch surface;
   };
   void operator()(int x, int y, ScenePicture& picture, Scratch& scratch) const {
     const std::size_t pixel =
@@ -95,7 +96,7 @@ class PixelTracer {
           hit ? scratch.seen.up_to(static_cast<float>(hit->distance)) : scratch.seen.all();
       const double through = static_cast<double>(before.c[3]);
       const Eigen::Vector3d behind = hit ? shine(ray.origin + hit->distance * ray.direction, *hit,
-                                                 {options_.seed, pixel, i, options_.samples}, scratch.nearby)
+                                                 {options_.seed, pixel, i, options_.samples}, scratch.surface)
                                          : vector_of(around_.background);
       const Eigen::Vector3d light = colour_of(before) + through * behind;
       means.light += light;
@@ -111,7 +112,7 @@ class PixelTracer {
   }
 
   [[nodiscard]] Eigen::Vector3d shine(const Eigen::Vector3d& place, const Surfaces::Hit& hit,
-                                      const SurfaceLight::Draw& draw, RayLight& scratch) const {
+                                      const SurfaceLight::Draw& draw, SurfaceLight::Scratch& scratch) const {
     const Eigen::Vector3d falls =
         lights_.sample(place, hit.normal, draw, scratch) / std::numbers::pi + vector_of(around_.ambient);
     return vector_of(hit.material->emitted) + vector_of(hit.material->albedo).cwiseProduct(falls);

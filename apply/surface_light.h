@@ -41,9 +41,14 @@ class SurfaceLight {
     [[nodiscard]] double spread(int i) const { return (sample + number(i)) / samples; }
     static constexpr std::uint64_t kEach = 64;  ///< more than a sample takes
   };
+  /// What a thread keeps from sample to sample.
+  struct Scratch {
+    RayLight along;
+    std::vector<double> close_by;  ///< of each flame
+  };
   /// At a surface with this normal (unit length), grey levels times steradian. `scratch` is the caller's own.
   [[nodiscard]] Eigen::Vector3d sample(const Eigen::Vector3d& place, const Eigen::Vector3d& normal,
-                                       const Draw& draw, RayLight& scratch) const;
+                                       const Draw& draw, Scratch& scratch) const;
 
  private:
   /// A place that sends light, and how much would arrive if nothing stood between.
@@ -53,11 +58,11 @@ class SurfaceLight {
   };
   /// `which`: 0..1 over the flames' power.
   [[nodiscard]] Proposal proposed(const Eigen::Vector3d& place, const Eigen::Vector3d& normal, double which,
-                                  const Eigen::Vector3d& within) const;
+                                  const Eigen::Vector3d& within, const std::vector<double>& close_by) const;
   [[nodiscard]] Eigen::Vector3d from_one_place(const Eigen::Vector3d& place, const Eigen::Vector3d& normal,
-                                               const Draw& draw) const;
+                                               const Draw& draw, const std::vector<double>& close_by) const;
   [[nodiscard]] Eigen::Vector3d along_a_ray(const Eigen::Vector3d& place, const Eigen::Vector3d& normal,
-                                            const Draw& draw, RayLight& scratch) const;
+                                            const Draw& draw, Scratch& scratch) const;
 
   struct Emitter {
     std::uint32_t flame, voxel;
@@ -66,6 +71,8 @@ class SurfaceLight {
   const Surfaces& surfaces_;
   std::vector<Emitter> emitters_;
   std::vector<double> power_until_;  ///< of each emitter: its own and all before it
+  std::vector<std::uint32_t>
+      guide_;  ///< the first emitter of each equal share of the power (Chen and Asau 1974)
 };
 
 }  // namespace emberlock::apply

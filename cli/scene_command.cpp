@@ -30,7 +30,7 @@ struct SceneArguments {
   FrameFormat format;
   std::optional<int> frames;
   int samples = 16;
-  int light_voxels = 32;
+  int light_voxels = 48;
   std::uint64_t seed = 1;
   double brightness = 1;
   bool transparent = false;

@@ -310,7 +310,7 @@ TEST_F(ScenePictureTest, SamplesOfTheIrradianceAreRightInTheMean) {
     test::add_square(nothing, 50, 50, 0, 0.1);  // elsewhere
     const Surfaces away = built(std::move(nothing));
     const SurfaceLight unhidden(flames, away);
-    RayLight scratch;
+    SurfaceLight::Scratch scratch;
     Eigen::Vector3d sum = Eigen::Vector3d::Zero();
     constexpr int kSamples = 20000;
     for (int s = 0; s < kSamples; ++s)

@@ -71,7 +71,7 @@ Status FrameFiles::put_exr(const recon::RadianceImage& light, const std::vector<
     for (std::size_t i = 0; i < opacity.size(); ++i) channel[c][i] = light.rgb[3 * i + c] / kWhite;
   }
   std::vector<recon::ExrChannel> all{{"R", channel[0]}, {"G", channel[1]}, {"B", channel[2]}, {"A", opacity}};
-  for (const recon::ExrChannel& channel : further) all.push_back(channel);
+  for (const recon::ExrChannel& one : further) all.push_back(one);
   return put_exr(light.size, all);
 }
 

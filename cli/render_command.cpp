@@ -16,6 +16,7 @@
 #include <fmt/format.h>
 
 #include "cli/commands.h"
+#include "cli/frame_files.h"
 #include "cli/image_size.h"
 #include "cli/interrupt.h"
 #include "cli/numbers.h"
@@ -24,20 +25,15 @@
 #include "cli/up_axis.h"
 #include "recon/calibrate/camera_path.h"
 #include "recon/effects/lighting.h"
-#include "recon/export/exr_file.h"
-#include "recon/export/picture.h"
 #include "recon/export/preview.h"
 #include "recon/pipeline/scene.h"
 #include "recon/pipeline/shown_volume.h"
 #include "recon/preprocess/radiance.h"
 #include "report/inferno.h"
-#include "session/video_writer.h"
 
 namespace emberlock::cli {
 namespace {
 namespace fs = std::filesystem;
-
-constexpr float kWhite = 255;
 
 struct RenderArguments {
   std::string result, out;
@@ -47,18 +43,16 @@ struct RenderArguments {
   std::string image = "640x480";
   std::string quantity = "colour";
   std::string light;
-  std::string format = "png";
+  FrameFormat format;
   int frames = 96;
   double elevation_degrees = 10;
   std::optional<double> distance;
   double brightness = 1;
-  double rate = 24;
   bool transparent = false;
   std::string device = "auto";
   int threads = 0;
 
   [[nodiscard]] bool kelvin() const { return quantity == "temperature"; }
-  [[nodiscard]] bool video() const { return format == "mp4" || format == "ffv1"; }
 };
 
 Result<Eigen::Vector3d> parse_place(const std::string& text, const char* option) {
@@ -129,27 +123,8 @@ Result<std::vector<recon::CameraModel>> cameras_of(const RenderArguments& a, con
   return recon::orbit({at, box.size}, size, options);
 }
 
-/// Colours and opacities of 8 bits. What glows before nothing has to cover it where it is bright: PNG knows
-/// no light that is only added.
-struct Picture {
-  Image rgb;
-  std::vector<std::uint8_t> opacity;
-};
-Picture picture_of(const recon::ShownView& view, bool transparent) {
-  if (!transparent) return {recon::to_rgb8(view.light), {}};
-  recon::RadianceImage bare(view.light.size);
-  std::vector<std::uint8_t> opacity(view.opacity.size());
-  for (std::size_t i = 0; i < opacity.size(); ++i) {
-    const float* rgb = &view.light.rgb[3 * i];
-    const float alpha = std::clamp(
-        std::max({view.opacity[i], rgb[0] / kWhite, rgb[1] / kWhite, rgb[2] / kWhite}), 0.0F, 1.0F);
-    opacity[i] = static_cast<std::uint8_t>(std::lround(kWhite * alpha));
-    for (std::size_t c = 0; c < 3; ++c) bare.rgb[3 * i + c] = alpha > 0 ? rgb[c] / alpha : 0;
-  }
-  return {recon::to_rgb8(bare), std::move(opacity)};
-}
-Picture picture_of(const std::vector<float>& kelvin, ImageSize size, const recon::BarEnds& ends,
-                   bool transparent) {
+Picture temperature_picture(const std::vector<float>& kelvin, ImageSize size, const recon::BarEnds& ends,
+                            bool transparent) {
   Picture picture{Image(ImageLayout{size, PixelFormat::rgb8, 8}), {}};
   if (transparent) picture.opacity.resize(kelvin.size());
   for (std::size_t i = 0; i < kelvin.size(); ++i) {
@@ -167,54 +142,6 @@ Picture picture_of(const std::vector<float>& kelvin, ImageSize size, const recon
   return picture;
 }
 
-/// Pictures in a folder, or one video.
-class FrameFiles {
- public:
-  static Result<FrameFiles> create(const RenderArguments& a, const fs::path& folder, ImageSize size) {
-    FrameFiles files(folder);
-    if (!a.video()) return files;
-    using Coding = session::VideoWriter::Coding;
-    const bool lossless = a.format == "ffv1";
-    EMBERLOCK_ASSIGN_OR_RETURN(
-        files.video_, session::VideoWriter::create(folder / (lossless ? "render.mkv" : "render.mp4"),
-                                                   {size, PixelFormat::rgb8, 8}, Hertz(a.rate), 0,
-                                                   lossless ? Coding::lossless : Coding::for_players));
-    return files;
-  }
-  Status put(const Picture& picture) {
-    if (video_) return video_->show(picture.rgb);
-    const fs::path path = next(".png");
-    return picture.opacity.empty() ? recon::write_png(picture.rgb.view(), path)
-                                   : recon::write_png(picture.rgb.view(), picture.opacity, path);
-  }
-  /// As fractions of white, the opacity beside them.
-  Status put_exr(const recon::ShownView& view) {
-    std::vector<float> channel[3];
-    for (std::size_t c = 0; c < 3; ++c) {
-      channel[c].resize(view.opacity.size());
-      for (std::size_t i = 0; i < view.opacity.size(); ++i)
-        channel[c][i] = view.light.rgb[3 * i + c] / kWhite;
-    }
-    return recon::write_exr(view.light.size,
-                            {{"R", channel[0]}, {"G", channel[1]}, {"B", channel[2]}, {"A", view.opacity}},
-                            next(".exr"));
-  }
-  Status put_exr(const std::vector<float>& kelvin, ImageSize size) {
-    return recon::write_exr(size, {{"T", kelvin}}, next(".exr"));
-  }
-  Status close() { return video_ ? video_->close() : Status(); }
-
- private:
-  explicit FrameFiles(fs::path folder) : folder_(std::move(folder)) {}
-  [[nodiscard]] fs::path next(const char* ending) {
-    return folder_ / fmt::format("frame-{:04}{}", number_++, ending);
-  }
-
-  fs::path folder_;
-  int number_ = 0;
-  std::unique_ptr<session::VideoWriter> video_;
-};
-
 /// Renders some cameras' pictures into their files.
 using RenderSome = std::function<Status(const std::vector<const recon::CameraModel*>&, FrameFiles&)>;
 
@@ -223,8 +150,9 @@ RenderSome colours(const RenderArguments& a, recon::ShownVolume shown, const rec
              const auto& cameras, FrameFiles& files) -> Status {
     for (recon::ShownView& view : views.of(cameras)) {
       for (float& v : view.light.rgb) v *= static_cast<float>(a.brightness);
-      EMBERLOCK_RETURN_IF_ERROR(a.format == "exr" ? files.put_exr(view)
-                                                  : files.put(picture_of(view, a.transparent)));
+      EMBERLOCK_RETURN_IF_ERROR(a.format.format == "exr"
+                                    ? files.put_exr(view.light, view.opacity)
+                                    : files.put(picture_of(view.light, view.opacity, a.transparent)));
     }
     return {};
   };
@@ -238,8 +166,9 @@ RenderSome temperatures(const RenderArguments& a, const recon::ShownVolume& show
   return [&a, ends, least, size = path.front().intrinsics.size, views = std::move(views)](
              const auto& cameras, FrameFiles& files) -> Status {
     for (const std::vector<float>& kelvin : views.of(cameras, least))
-      EMBERLOCK_RETURN_IF_ERROR(a.format == "exr" ? files.put_exr(kelvin, size)
-                                                  : files.put(picture_of(kelvin, size, ends, a.transparent)));
+      EMBERLOCK_RETURN_IF_ERROR(a.format.format == "exr"
+                                    ? files.put_exr(size, {{"T", kelvin}})
+                                    : files.put(temperature_picture(kelvin, size, ends, a.transparent)));
     return {};
   };
 }
@@ -271,11 +200,11 @@ Status check_used(const RenderArguments& a, const CLI::App& verb) {
   const bool along = !one && a.path == "cameras";
   const bool around = !one && !along;
   const std::pair<const char*, bool> used[] = {
-      {"--frames", !one},       {"--elevation", around},
-      {"--distance", around},   {"--up", !along},
-      {"--input", along},       {"--rig", along},
-      {"--rate", a.video()},    {"--brightness", !a.kelvin()},
-      {"--light", !a.kelvin()}, {"--transparent", a.format == "png"}};
+      {"--frames", !one},           {"--elevation", around},
+      {"--distance", around},       {"--up", !along},
+      {"--input", along},           {"--rig", along},
+      {"--rate", a.format.video()}, {"--brightness", !a.kelvin()},
+      {"--light", !a.kelvin()},     {"--transparent", a.format.format == "png"}};
   for (const auto& [name, applies] : used)
     if (!applies && verb.count(name) > 0)
       return Error{ErrorKind::bad_input, "changes nothing here", name, "Leave it away"};
@@ -283,22 +212,13 @@ Status check_used(const RenderArguments& a, const CLI::App& verb) {
 }
 
 Status check(const RenderArguments& a, ImageSize size) {
-  constexpr int kMost = 4096;
   constexpr double kFar = 1e6;
   const auto within = [](double value, double least, double most) { return value >= least && value <= most; };
-  if (!within(size.width, 16, kMost) || !within(size.height, 16, kMost))
-    return Error{ErrorKind::bad_input, "\"" + a.image + "\" is out of range", "--image",
-                 "Give sides of 16 to 4096"};
-  if (a.format == "mp4" && (size.width % 2 != 0 || size.height % 2 != 0))
-    return Error{ErrorKind::bad_input, "a video for players has even sides", "--image", "Give even ones"};
-  if (!within(a.brightness, 1 / kFar, kFar))
-    return Error{ErrorKind::bad_input, "is out of range", "--brightness", "Give a factor of 1e-6 to 1e6"};
+  EMBERLOCK_RETURN_IF_ERROR(check_frames(a.format, size, a.brightness));
   if (a.distance && !within(*a.distance, 1 / kFar, kFar))
     return Error{ErrorKind::bad_input, "is out of range", "--distance", "Give 1e-6 to 1e6 m"};
   if (!within(a.elevation_degrees, -89, 89))
     return Error{ErrorKind::bad_input, "is out of range", "--elevation", "Give -89 to 89 degrees"};
-  if (!within(a.rate, 1, 240))
-    return Error{ErrorKind::bad_input, "is out of range", "--rate", "Give 1 to 240 frames a second"};
   return {};
 }
 
@@ -346,7 +266,7 @@ Status render(const RenderArguments& a, const CLI::App& verb) try {
   const recon::BarEnds middle = recon::middle_by_light(shown.kelvin, shown.volume.emission);
   const recon::BarEnds ends = recon::kelvin_bar(middle.low, middle.high);
   EMBERLOCK_ASSIGN_OR_RETURN(OutputFolder folder, OutputFolder::create(request));
-  EMBERLOCK_ASSIGN_OR_RETURN(FrameFiles files, FrameFiles::create(a, folder.path(), size));
+  EMBERLOCK_ASSIGN_OR_RETURN(FrameFiles files, FrameFiles::create(a.format, folder.path(), "render", size));
   const recon::Lighting lighting = shown.lighting;
   const RenderSome render_some =
       a.kelvin() ? temperatures(a, shown, path, ends, compute) : colours(a, std::move(shown), compute);
@@ -407,7 +327,7 @@ void add_render(CLI::App& app) {
       ->check(CLI::IsMember({"colour", "temperature"}))
       ->capture_default_str();
   verb->add_option(
-          "--format", a.format,
+          "--format", a.format.format,
           "png; exr: 32 bits, R, G, B and the opacity A, or T in K; mp4: for any player; ffv1: lossless, "
           "in Matroska")
       ->check(CLI::IsMember({"png", "exr", "mp4", "ffv1"}))
@@ -418,7 +338,7 @@ void add_render(CLI::App& app) {
       ->type_name("TEXT");
   verb->add_flag("--transparent", a.transparent, "PNG before nothing instead of black; EXR always is");
   verb->add_option("--brightness", a.brightness, "Factor of the colours")->capture_default_str();
-  verb->add_option("--rate", a.rate, "Of a video, frames a second")->capture_default_str();
+  verb->add_option("--rate", a.format.rate, "Of a video, frames a second")->capture_default_str();
   verb->add_option("--device", a.device, "auto, cpu, cuda, or cuda:N: the GPU of this number")
       ->capture_default_str();
   verb->add_option("--threads", a.threads, "CPU threads; 0: one per core")

@@ -38,27 +38,6 @@ std::vector<RadianceImage> weighted_sums(const Volume& weighted,
   return rendered(weighted, whole_grid(weighted.grid), absorption_of(weighted), cameras, options);
 }
 
-/// The voxels that hold anything: a result doesn't tell its hull.
-Hull filled_voxels(const Volume& volume) {
-  const Grid& g = volume.grid;
-  const auto holds = [&](std::size_t p) {
-    const float* rgb = &volume.emission[3 * p];
-    return volume.extinction[p] > 0 || rgb[0] > 0 || rgb[1] > 0 || rgb[2] > 0;
-  };
-  Hull medium = whole_grid(g);
-  medium.count = 0;
-  std::size_t voxel = 0;
-  for (int k = 0; k < g.nz - 1; ++k)
-    for (int j = 0; j < g.ny - 1; ++j)
-      for (int i = 0; i < g.nx - 1; ++i) {
-        bool any = false;
-        for (int c = 0; c < 8; ++c) any = any || holds(g.index(i + (c & 1), j + (c >> 1 & 1), k + (c >> 2)));
-        medium.inside[voxel++] = any ? 1 : 0;
-        medium.count += any ? 1 : 0;
-      }
-  return medium;
-}
-
 Eigen::Vector3d from_middle(const Light& light, const Box& box) {
   return Eigen::Vector3d(light.place[0], light.place[1], light.place[2]) - box.center;
 }
@@ -89,6 +68,27 @@ Box box_of(const Grid& grid) {
   const Eigen::Vector3d size =
       static_cast<double>(grid.edge) * Eigen::Vector3d(grid.nx - 1, grid.ny - 1, grid.nz - 1);
   return {origin + size / 2, size};
+}
+
+Hull filled_voxels(const Volume& volume) {
+  const Grid& g = volume.grid;
+  const auto holds = [&](std::size_t p) {
+    const float* rgb = &volume.emission[3 * p];
+    const bool absorbs = !volume.extinction.empty() && volume.extinction[p] > 0;
+    return absorbs || rgb[0] > 0 || rgb[1] > 0 || rgb[2] > 0;
+  };
+  Hull medium = whole_grid(g);
+  medium.count = 0;
+  std::size_t voxel = 0;
+  for (int k = 0; k < g.nz - 1; ++k)
+    for (int j = 0; j < g.ny - 1; ++j)
+      for (int i = 0; i < g.nx - 1; ++i) {
+        bool any = false;
+        for (int c = 0; c < 8; ++c) any = any || holds(g.index(i + (c & 1), j + (c >> 1 & 1), k + (c >> 2)));
+        medium.inside[voxel++] = any ? 1 : 0;
+        medium.count += any ? 1 : 0;
+      }
+  return medium;
 }
 
 Status relight(ShownVolume& shown, Light light, const ComputeOptions& compute) {

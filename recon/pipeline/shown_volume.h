@@ -27,6 +27,8 @@ struct ShownVolume {
 /// and read_values().
 Result<ShownVolume> read_shown_volume(const std::filesystem::path& result);
 Box box_of(const Grid& grid);
+/// The voxels that hold anything: a result doesn't tell its hull.
+Hull filled_voxels(const Volume& volume);
 
 /// Puts another light into the place of that which a lit medium was filmed under. Where nothing shades it,
 /// and of one nearby in the middle of the box, it is as bright and of the colour as that was, with what came

@@ -10,30 +10,13 @@
 #include "recon/effects/exposure.h"
 #include "recon/effects/sensor.h"
 #include "recon/hull/ray_list.h"
+#include "recon/render/cropped_source.h"
 #include "recon/render/march_table.h"
 #include "recon/render/render_cuda.h"
 #include "recon/render/scattered_source.h"
 
 namespace emberlock::recon {
 namespace {
-
-/// Emission, and in lane 3 the extinction if it is a field, per voxel edge, at the cropped grid's key points.
-std::vector<Rgba> crop_volume(const Volume& volume, const CroppedHull& crop, Extinction::Model extinction) {
-  const Grid& c = crop.hull.grid;
-  std::vector<Rgba> out(c.size());
-  for (int k = 0; k < c.nz; ++k) {
-    for (int j = 0; j < c.ny; ++j) {
-      const std::size_t first = volume.grid.index(crop.offset[0], crop.offset[1] + j, crop.offset[2] + k);
-      const float* from = &volume.emission[3 * first];
-      Rgba* to = &out[c.index(0, j, k)];
-      for (int i = 0; i < c.nx; ++i, from += 3) to[i] = c.edge * Rgba{{from[0], from[1], from[2], 0}};
-      if (extinction == Extinction::Model::field)
-        for (int i = 0; i < c.nx; ++i)
-          to[i].c[3] = c.edge * volume.extinction[first + static_cast<std::size_t>(i)];
-    }
-  }
-  return out;
-}
 
 constexpr Absorb absorb_of(Extinction::Model model) {
   switch (model) {
@@ -98,7 +81,7 @@ class Renderer {
         options_(options),
         pool_(pool),
         crop_(crop_to_medium(medium)),
-        source_(crop_volume(volume, crop_, effects.extinction.model)),
+        source_(cropped_source(volume, crop_, effects.extinction.model)),
         sigma_(static_cast<float>(effects.extinction.value.value() * static_cast<double>(volume.grid.edge))),
         blur_(effects.exposure, crop_.hull.grid) {
     if (effects.scattering.order == Scattering::Order::none) return;

@@ -143,6 +143,8 @@ class OutputFolders : public testing::Test {
     const std::string hot = test::make_hot_volume(temp_ / "hot" / "volume.vdb").string();
     test::record(temp_ / "session", {{64, 48}, PixelFormat::gray8, 8}, 2, test::small_disk_options());
     const std::string session = (temp_ / "session").string();
+    const std::string scene = (temp_ / "scene.json").string();
+    write(scene, R"({"format": "emberlock scene", "version": 1, "flames": [{"result": "hot/volume.vdb"}]})");
     Words clips = make_clips(temp_ / "clips");
     const fs::path clip = clips.front();
     clips.insert(clips.begin(), "verify");
@@ -211,6 +213,12 @@ class OutputFolders : public testing::Test {
          "--out",
          add_render,
          {"render", hot, "--frames", "2", "--image", "32x32"},
+         hot,
+         {"frame-0000.png", "frame-0001.png"}},
+        {"scene",
+         "--out",
+         add_scene,
+         {"scene", scene, "--frames", "2", "--image", "32x32"},
          hot,
          {"frame-0000.png", "frame-0001.png"}},
         {"export", "--out", add_export, {"export", hot}, hot, {"flame.vdb"}},
@@ -286,10 +294,10 @@ TEST_F(OutputFolders, TheTablesHoldEveryVerbThatWritesOne) {
     }
   }
   CLI::App app{"", "emberlock"};
-  for (const auto add : {add_devices,   add_smear,    add_align,  add_reconstruct, add_verify,  add_tradeoff,
-                         add_calibrate, add_import,   add_demo,   add_sample,      add_doctor,  add_bench,
-                         add_sessions,  add_status,   add_jobs,   add_watch,       add_record,  add_strobe,
-                         add_measure,   add_simulate, add_render, add_export,      add_evaluate})
+  for (const auto add : {add_devices,   add_smear,    add_align,  add_reconstruct, add_verify,   add_tradeoff,
+                         add_calibrate, add_import,   add_demo,   add_sample,      add_doctor,   add_bench,
+                         add_sessions,  add_status,   add_jobs,   add_watch,       add_record,   add_strobe,
+                         add_measure,   add_simulate, add_render, add_export,      add_evaluate, add_scene})
     add(app);
   std::set<std::string> found;
   cli::visit(app, "emberlock", [&](const CLI::App& verb, const std::string& path) {

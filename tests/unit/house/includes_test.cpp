@@ -27,10 +27,12 @@ const std::map<std::string, std::set<std::string>> kMayInclude{
     {"rig", {"base", "proto", "smear_sync", "session", "drivers", "recon"}},
     {"films", {"base", "proto", "smear_sync", "session", "recon"}},
     {"evaluate", {"base", "smear_sync", "session", "recon"}},
+    {"apply", {"base", "session", "recon"}},
     {"report", {"base", "proto", "smear_sync", "session", "recon", "rig", "films", "evaluate"}},
     {"daemon", {"base", "proto", "smear_sync", "session", "drivers", "recon", "rig", "report"}},
     {"cli",
-     {"base", "proto", "smear_sync", "session", "drivers", "recon", "rig", "films", "evaluate", "report"}},
+     {"base", "proto", "smear_sync", "session", "drivers", "recon", "rig", "films", "evaluate", "apply",
+      "report"}},
 };
 
 // Inside these a folder includes itself, the ones before it, and what lies directly in the house's folder.
@@ -149,7 +151,8 @@ TEST(House, ARoomLinksOnlyWhatStandsAboveIt) {
           << library << " links " << link << ", which " << room << "/ may not";
     }
   }
-  for (const char* room : {"base", "smear_sync", "session", "recon", "films", "evaluate", "report", "cli"})
+  for (const char* room :
+       {"base", "smear_sync", "session", "recon", "films", "evaluate", "apply", "report", "cli"})
     EXPECT_TRUE(rooms.contains(room)) << room << " is not in links.txt";
 }
 
@@ -208,7 +211,7 @@ TEST(House, OnlyOutputFolderReplacesAndRemovesFolders) {
 
 TEST(House, EveryFolderExplainsItself) {
   for (const char* folder : {"base", "proto", "smear_sync", "session", "drivers", "recon", "rig", "films",
-                             "evaluate", "report", "daemon", "cli", "tests"}) {
+                             "evaluate", "apply", "report", "daemon", "cli", "tests"}) {
     EXPECT_TRUE(fs::exists(kRoot / folder / "README.md")) << folder;
   }
 }

@@ -27,6 +27,7 @@ const std::map<std::string, std::string> kRooms{
     {"rig", "emberlock::rig"},
     {"films", "emberlock::films"},
     {"evaluate", "emberlock::evaluate"},
+    {"apply", "emberlock::apply"},
     {"report", "emberlock::report"},
     {"daemon", "emberlock::daemon"},
     {"cli", "emberlock::cli"},

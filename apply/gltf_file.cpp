@@ -1,0 +1,321 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "apply/gltf_file.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <set>
+
+#include <Eigen/Geometry>
+#include <fmt/format.h>
+#include <tiny_gltf.h>
+
+#include "apply/unreadable.h"
+#include "base/file.h"
+#include "base/nesting.h"
+
+namespace emberlock::apply {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr float kWhiteLevel = 255;
+constexpr int kDeepestNode = 1000;
+
+template <class T>
+const T& entry(const std::vector<T>& all, int index, const std::string& what) {
+  if (index < 0 || static_cast<std::size_t>(index) >= all.size())
+    refuse(fmt::format("{} {} isn't there", what, index), what);
+  return all[static_cast<std::size_t>(index)];
+}
+
+/// z upwards from y upwards.
+Eigen::Matrix4d world_axes() {
+  Eigen::Matrix4d m = Eigen::Matrix4d::Zero();
+  m(0, 0) = m(2, 1) = m(3, 3) = 1;
+  m(1, 2) = -1;
+  return m;
+}
+
+Eigen::Matrix4d matrix_of(const Placement& place) {
+  Eigen::Matrix4d m = Eigen::Matrix4d::Identity();
+  m.topLeftCorner<3, 3>() = place.scale * place.rotation;
+  m.topRightCorner<3, 1>() = place.translation;
+  return m;
+}
+
+/// Errors: a matrix that isn't a similarity.
+Placement placement_in(const Eigen::Matrix4d& m, const std::string& where) {
+  const Eigen::Matrix3d linear = m.topLeftCorner<3, 3>();
+  const double scale = std::cbrt(std::abs(linear.determinant()));
+  if (!(scale > 0) ||
+      !((linear.transpose() * linear / (scale * scale) - Eigen::Matrix3d::Identity()).norm() < 1e-3))
+    refuse("is stretched or sheared", where, "Scale flames and cameras evenly");
+  return {linear / scale, m.topRightCorner<3, 1>(), scale};
+}
+
+Eigen::Matrix4d matrix_of(const tinygltf::Node& node, const std::string& where) {
+  Eigen::Matrix4d m = Eigen::Matrix4d::Identity();
+  if (node.matrix.size() == 16) {
+    m = Eigen::Map<const Eigen::Matrix4d>(node.matrix.data());
+  } else {
+    if (node.rotation.size() == 4)
+      m.topLeftCorner<3, 3>() =
+          Eigen::Quaterniond(node.rotation[3], node.rotation[0], node.rotation[1], node.rotation[2])
+              .normalized()
+              .toRotationMatrix();
+    if (node.scale.size() == 3)
+      m.topLeftCorner<3, 3>() *= Eigen::Map<const Eigen::Vector3d>(node.scale.data()).asDiagonal();
+    if (node.translation.size() == 3)
+      m.topRightCorner<3, 1>() = Eigen::Map<const Eigen::Vector3d>(node.translation.data());
+  }
+  if (!m.allFinite()) refuse("its place isn't finite", where);
+  return m;
+}
+
+/// The elements of an accessor, wherever they lie in its buffer.
+class Elements {
+ public:
+  Elements(const tinygltf::Model& model, int accessor, int type, const std::string& where) {
+    const tinygltf::Accessor& a = entry(model.accessors, accessor, "accessor");
+    if (a.sparse.isSparse) refuse("sparse accessors can't be read", where, "Export without them");
+    if (a.type != type) refuse(fmt::format("accessor {} is of another type", accessor), where);
+    const tinygltf::BufferView& view = entry(model.bufferViews, a.bufferView, "bufferView");
+    const tinygltf::Buffer& buffer = entry(model.buffers, view.buffer, "buffer");
+    const int stride = a.ByteStride(view);
+    const auto size = static_cast<std::size_t>(
+        std::max(0, tinygltf::GetComponentSizeInBytes(static_cast<std::uint32_t>(a.componentType)) *
+                        tinygltf::GetNumComponentsInType(static_cast<std::uint32_t>(type))));
+    if (stride <= 0 || size == 0 || static_cast<std::size_t>(stride) < size)
+      refuse(fmt::format("accessor {} has no step", accessor), where);
+    stride_ = static_cast<std::size_t>(stride);
+    count_ = a.count;
+    kind_ = a.componentType;
+    const std::size_t all = buffer.data.size();
+    if (view.byteOffset > all || view.byteLength > all - view.byteOffset || a.byteOffset > view.byteLength ||
+        (count_ > 0 && (count_ - 1 > (view.byteLength - a.byteOffset) / stride_ ||
+                        (count_ - 1) * stride_ + size > view.byteLength - a.byteOffset)))
+      refuse(fmt::format("accessor {} goes beyond its buffer", accessor), where, "The file is cut short");
+    data_ = buffer.data.data() + view.byteOffset + a.byteOffset;
+  }
+  [[nodiscard]] std::size_t size() const { return count_; }
+  [[nodiscard]] int kind() const { return kind_; }
+  template <class T>
+  [[nodiscard]] T at(std::size_t i) const {
+    T value;
+    std::memcpy(&value, data_ + i * stride_, sizeof value);
+    return value;
+  }
+
+ private:
+  const unsigned char* data_ = nullptr;
+  std::size_t stride_ = 0, count_ = 0;
+  int kind_ = 0;
+};
+
+std::vector<std::uint32_t> indices_of(const tinygltf::Model& model, int accessor, const std::string& where) {
+  const Elements elements(model, accessor, TINYGLTF_TYPE_SCALAR, where);
+  std::vector<std::uint32_t> out(elements.size());
+  for (std::size_t i = 0; i < out.size(); ++i) {
+    switch (elements.kind()) {
+      case TINYGLTF_COMPONENT_TYPE_UNSIGNED_BYTE:
+        out[i] = elements.at<std::uint8_t>(i);
+        break;
+      case TINYGLTF_COMPONENT_TYPE_UNSIGNED_SHORT:
+        out[i] = elements.at<std::uint16_t>(i);
+        break;
+      case TINYGLTF_COMPONENT_TYPE_UNSIGNED_INT:
+        out[i] = elements.at<std::uint32_t>(i);
+        break;
+      default:
+        refuse("indices are of no unsigned type", where);
+    }
+  }
+  return out;
+}
+
+Material material_of(const tinygltf::Material& from, const std::string& where) {
+  Material out;
+  double strength = 1;
+  if (const auto at = from.extensions.find("KHR_materials_emissive_strength"); at != from.extensions.end())
+    if (at->second.Has("emissiveStrength")) strength = at->second.Get("emissiveStrength").GetNumberAsDouble();
+  const auto within = [&](double v, double most) {
+    if (!(v >= 0 && v <= most)) refuse("a colour is out of range", where);
+    return static_cast<float>(v);
+  };
+  const auto& base = from.pbrMetallicRoughness.baseColorFactor;
+  for (std::size_t c = 0; c < 3; ++c) {
+    if (c < base.size()) out.albedo[c] = within(base[c], 1);
+    if (c < from.emissiveFactor.size())
+      out.emitted[c] = kWhiteLevel * within(strength * from.emissiveFactor[c], 1e6);
+  }
+  return out;
+}
+
+/// Walks a file's nodes and adds what they hold.
+class GltfReader {
+ public:
+  GltfReader(const tinygltf::Model& model, const Placement& world_from_file, Mesh& mesh)
+      : model_(model), mesh_(mesh), seen_(model.nodes.size()) {
+    first_material_ = static_cast<std::uint32_t>(mesh.materials.size());
+    for (std::size_t i = 0; i < model.materials.size(); ++i) {
+      mesh.materials.push_back(material_of(model.materials[i], fmt::format("materials[{}]", i)));
+      note_left_out(model.materials[i]);
+    }
+    mesh.materials.emplace_back();  // where none is told
+    if (!model.animations.empty()) notes_.insert("animation is left out");
+    if (!model.skins.empty()) notes_.insert("skins are left out");
+    if (!model.lights.empty()) notes_.insert("its lights are left out: flames are the light");
+    const Eigen::Matrix4d top = matrix_of(world_from_file) * world_axes();
+    if (model.scenes.empty()) refuse("has no scene", "scenes");
+    for (const int node : entry(model.scenes, std::max(0, model.defaultScene), "scene").nodes)
+      walk(node, top, 0);
+  }
+  [[nodiscard]] GltfScene found() && {
+    scene_.notes.assign(notes_.begin(), notes_.end());
+    return std::move(scene_);
+  }
+
+ private:
+  void note_left_out(const tinygltf::Material& m) {
+    if (m.pbrMetallicRoughness.baseColorTexture.index >= 0 || m.emissiveTexture.index >= 0)
+      notes_.insert("textures are left out, and their factors shown");
+    if (m.alphaMode != "OPAQUE") notes_.insert("transparent materials are shown opaque");
+  }
+
+  void walk(int index, const Eigen::Matrix4d& world_from_parent, int depth) {
+    const tinygltf::Node& node = entry(model_.nodes, index, "node");
+    const std::string where = fmt::format("nodes[{}]", index);
+    if (seen_[static_cast<std::size_t>(index)])
+      refuse("is reached twice", where, "Nodes of a glTF file form trees");
+    if (depth > kDeepestNode) refuse("lies too deep", where);
+    seen_[static_cast<std::size_t>(index)] = true;
+    const Eigen::Matrix4d world_from_node = world_from_parent * matrix_of(node, where);
+    if (node.mesh >= 0)
+      for (const tinygltf::Primitive& primitive : entry(model_.meshes, node.mesh, "mesh").primitives)
+        add(primitive, world_from_node, where);
+    if (node.camera >= 0) add_camera(entry(model_.cameras, node.camera, "camera"), world_from_node, where);
+    if (node.extras.IsObject() && node.extras.Has("emberlock_flame")) {
+      const tinygltf::Value& result = node.extras.Get("emberlock_flame");
+      if (!result.IsString()) refuse("emberlock_flame isn't a path", where);
+      scene_.flames.push_back(
+          {result.Get<std::string>(), placement_in(world_from_node * world_axes().transpose(), where)});
+    }
+    for (const int child : node.children) walk(child, world_from_node, depth + 1);
+  }
+
+  void add_camera(const tinygltf::Camera& camera, const Eigen::Matrix4d& world_from_node,
+                  const std::string& where) {
+    if (camera.type != "perspective") return;
+    const double height = camera.perspective.yfov;
+    if (!(height > 0 && height < 3.1)) refuse("a camera's yfov is out of range", where);
+    const Eigen::Matrix4d forwards = Eigen::Vector4d(1, -1, -1, 1).asDiagonal();  // from OpenGL's axes
+    scene_.cameras.push_back({placement_in(world_from_node * forwards, where), Radians(height)});
+  }
+
+  void add(const tinygltf::Primitive& primitive, const Eigen::Matrix4d& world_from_node,
+           const std::string& where) {
+    if (primitive.mode >= TINYGLTF_MODE_POINTS && primitive.mode <= TINYGLTF_MODE_LINE_STRIP) {
+      notes_.insert("points and lines are left out");
+      return;
+    }
+    if (primitive.mode != TINYGLTF_MODE_TRIANGLES && primitive.mode != -1)
+      refuse("strips and fans of triangles can't be read", where, "Export single triangles");
+    const auto position = primitive.attributes.find("POSITION");
+    if (position == primitive.attributes.end()) refuse("a mesh has no POSITION", where);
+    const Elements places(model_, position->second, TINYGLTF_TYPE_VEC3, where);
+    if (places.kind() != TINYGLTF_COMPONENT_TYPE_FLOAT) refuse("POSITION isn't of floats", where);
+    std::vector<std::uint32_t> corners;
+    if (primitive.indices >= 0) {
+      corners = indices_of(model_, primitive.indices, where);
+    } else {
+      corners.resize(std::min(places.size(), 3 * kMostTriangles + 3));
+      for (std::size_t i = 0; i < corners.size(); ++i) corners[i] = static_cast<std::uint32_t>(i);
+    }
+    const std::size_t count = corners.size() / 3;
+    if (mesh_.triangles.size() + count > kMostTriangles ||
+        mesh_.vertices.size() + places.size() > 3 * kMostTriangles)
+      refuse(fmt::format("has more than {} triangles", kMostTriangles), where, "Simplify the geometry");
+    const auto base = static_cast<std::uint32_t>(mesh_.vertices.size());
+    for (std::size_t i = 0; i < places.size(); ++i) {
+      const auto local = places.at<std::array<float, 3>>(i);
+      const Eigen::Vector4d world =
+          world_from_node * Eigen::Vector4d(static_cast<double>(local[0]), static_cast<double>(local[1]),
+                                            static_cast<double>(local[2]), 1);
+      if (!(world.cwiseAbs().maxCoeff() < 1e7)) refuse("a vertex isn't finite, or farther than 1e7 m", where);
+      mesh_.vertices.push_back(
+          {static_cast<float>(world[0]), static_cast<float>(world[1]), static_cast<float>(world[2])});
+    }
+    std::uint32_t material = static_cast<std::uint32_t>(model_.materials.size());
+    if (primitive.material >= 0) {
+      entry(model_.materials, primitive.material, "material");
+      material = static_cast<std::uint32_t>(primitive.material);
+    }
+    for (std::size_t t = 0; t < count; ++t) {
+      for (std::size_t c = 0; c < 3; ++c)
+        if (corners[3 * t + c] >= places.size()) refuse("a triangle's corner isn't there", where);
+      mesh_.triangles.push_back(
+          {base + corners[3 * t], base + corners[3 * t + 1], base + corners[3 * t + 2]});
+      mesh_.material.push_back(first_material_ + material);
+    }
+  }
+
+  const tinygltf::Model& model_;
+  Mesh& mesh_;
+  std::vector<bool> seen_;
+  std::uint32_t first_material_ = 0;
+  GltfScene scene_;
+  std::set<std::string> notes_;
+};
+
+/// The JSON of a binary file, for what is checked before the parser runs.
+std::string_view json_of(std::string_view bytes) {
+  constexpr std::size_t kHeader = 20;
+  if (!bytes.starts_with("glTF") || bytes.size() < kHeader) return bytes;
+  std::uint32_t length = 0;
+  std::memcpy(&length, bytes.data() + 12, sizeof length);
+  return bytes.substr(kHeader, length);
+}
+
+tinygltf::Model model_of(const std::string& bytes, const fs::path& file) {
+  tinygltf::TinyGLTF loader;
+  loader.SetImageLoader([](tinygltf::Image*, int, std::string*, std::string*, int, int, const unsigned char*,
+                           int, void*) { return true; },
+                        nullptr);
+  tinygltf::Model model;
+  std::string error, warning;
+  const std::string folder = fs::absolute(file).parent_path().string();
+  const auto size = static_cast<unsigned int>(bytes.size());
+  const bool done =
+      bytes.starts_with("glTF")
+          ? loader.LoadBinaryFromMemory(&model, &error, &warning,
+                                        reinterpret_cast<const unsigned char*>(bytes.data()), size, folder)
+          : loader.LoadASCIIFromString(&model, &error, &warning, bytes.data(), size, folder);
+  std::replace(error.begin(), error.end(), '\n', ' ');
+  if (!done) refuse(error.empty() ? "is no glTF file" : "is no glTF file: " + error, {}, "Export it again");
+  static const std::set<std::string> harmless{"KHR_materials_emissive_strength", "KHR_materials_unlit",
+                                              "KHR_texture_transform", "KHR_lights_punctual"};
+  for (const std::string& extension : model.extensionsRequired)
+    if (!harmless.contains(extension))
+      refuse("needs the extension " + extension, "extensionsRequired", "Export without it (no compression)");
+  return model;
+}
+
+}  // namespace
+
+Result<GltfScene> read_gltf(const fs::path& file, const Placement& world_from_file, Mesh& mesh) {
+  EMBERLOCK_ASSIGN_OR_RETURN(const std::string bytes, read_file(file));
+  return parse_gltf(bytes, file, world_from_file, mesh);
+}
+
+Result<GltfScene> parse_gltf(const std::string& bytes, const fs::path& file, const Placement& world_from_file,
+                             Mesh& mesh) try {
+  EMBERLOCK_RETURN_IF_ERROR(check_json_nesting(json_of(bytes), file.string()));
+  return GltfReader(model_of(bytes, file), world_from_file, mesh).found();
+} catch (const Unreadable& e) {
+  return in_file(e.error, file.string());
+} catch (const std::exception& e) {
+  return Error{ErrorKind::bad_input, e.what(), file.string()};
+}
+
+}  // namespace emberlock::apply

@@ -1,0 +1,96 @@
+// SPDX-License-Identifier: Apache-2.0
+// Writes a scene to time `emberlock scene` with, and to compare it with other renderers: three flames of
+// 128^3 voxels (or another number) in a room of 10380 triangles.
+//   bench_scene FOLDER [VOXELS]; emberlock scene FOLDER/scene.json --out PICTURE --image 1280x720 --samples 2
+#include <cstdio>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <string>
+
+#include <Eigen/Core>
+#include <Eigen/Geometry>
+#include <fmt/format.h>
+
+#include "recon/export/volume_file.h"
+#include "recon/hull/hull.h"
+#include "recon/synthetic/flame.h"
+#include "tests/support/gltf_writer.h"
+
+namespace {
+
+using namespace emberlock;
+namespace fs = std::filesystem;
+using Eigen::Vector3d;
+
+/// A wall of 36 x 36 squares from a corner along two edges.
+void add_wall(test::GltfText& gltf, const Vector3d& corner, const Vector3d& along, const Vector3d& across,
+              int squares) {
+  const auto first = static_cast<int>(gltf.corners.size() / 3);
+  for (int j = 0; j <= squares; ++j)
+    for (int i = 0; i <= squares; ++i) {
+      const Vector3d p = corner + along * i / squares + across * j / squares;
+      for (const double v : {p.x(), p.z(), -p.y()})
+        gltf.corners.push_back(static_cast<float>(v));  // y upwards
+    }
+  const auto put = [&](int i, int j) {
+    gltf.indices.push_back(static_cast<std::uint16_t>(first + i + (squares + 1) * j));
+  };
+  for (int j = 0; j < squares; ++j)
+    for (int i = 0; i < squares; ++i)
+      for (const auto& [x, y] : {std::pair(0, 0), {1, 0}, {1, 1}, {0, 0}, {1, 1}, {0, 1}}) put(i + x, j + y);
+}
+
+/// Floor, back and sides of 2 m, and a pillar before the flames.
+std::string room() {
+  test::GltfText gltf;
+  gltf.corners.clear();
+  gltf.indices.clear();
+  const Vector3d x = Vector3d::UnitX();
+  const Vector3d y = Vector3d::UnitY();
+  const Vector3d z = Vector3d::UnitZ();
+  constexpr int kSquares = 36;
+  add_wall(gltf, {-1, -1, 0}, 2 * x, 2 * y, kSquares);
+  add_wall(gltf, {-1, 1, 0}, 2 * x, 1.5 * z, kSquares);
+  add_wall(gltf, {-1, -1, 0}, 2 * y, 1.5 * z, kSquares);
+  add_wall(gltf, {1, -1, 0}, 2 * y, 1.5 * z, kSquares);
+  const Vector3d foot(0.15, -0.45, 0);
+  for (const auto& [corner, along] :
+       {std::pair(foot, x), {foot + 0.1 * y, x}, {foot, y}, {foot + 0.1 * x, y}})
+    add_wall(gltf, corner, 0.1 * along, 0.8 * z, 1);
+  add_wall(gltf, foot, 0.1 * x, 0.1 * y, 1);
+  add_wall(gltf, foot + 0.8 * z, 0.1 * x, 0.1 * y, 1);
+  gltf.further =
+      R"("materials": [{"pbrMetallicRoughness": {"baseColorFactor": [0.8, 0.7, 0.6, 1], "metallicFactor": 0}}])";
+  std::printf("%zu triangles\n", gltf.indices.size() / 3);
+  return gltf.text();
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  if (argc < 2) return std::fprintf(stderr, "usage: bench_scene FOLDER [VOXELS]\n"), 2;
+  const fs::path folder = argv[1];
+  const int voxels = argc > 2 ? std::atoi(argv[2]) : 128;
+  const recon::Grid grid = recon::grid_over({Vector3d::Zero(), Vector3d::Constant(0.2)}, voxels);
+  std::string flames;
+  for (int f = 0; f < 3; ++f) {
+    recon::FlameOptions options;
+    options.seed = static_cast<std::uint64_t>(f + 1);
+    options.absorber = recon::Absorber::soot;
+    const recon::FlameTruth truth = recon::Flame(options).at(Seconds(0), grid);
+    const std::string name = fmt::format("flame-{}", f);
+    fs::create_directories(folder / name);
+    const Status written = recon::write_volume(truth.volume, folder / name / "volume.vdb");
+    if (!written.ok()) return std::fprintf(stderr, "%s\n", written.error().message().c_str()), 1;
+    flames +=
+        fmt::format(R"({}{{"result": "{}", "position": [{}, {}, 0.3], "rotation": [0, 0, {}], "scale": 3}})",
+                    f > 0 ? ", " : "", name, 0.45 * (f - 1), 0.3 * (f == 1), 40 * f);
+  }
+  std::ofstream(folder / "room.gltf") << room();
+  std::ofstream(folder / "scene.json") << R"({"format": "emberlock scene", "version": 1, "flames": [)"
+                                       << flames << R"(], "geometry": [{"file": "room.gltf"}],
+ "camera": {"from": [0.3, -2.4, 0.9], "look_at": [0, 0, 0.45]}})"
+                                       << '\n';
+  return 0;
+}

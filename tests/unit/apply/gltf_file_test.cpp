@@ -1,0 +1,206 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "apply/gltf_file.h"
+
+#include <fstream>
+#include <limits>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "base/file.h"
+#include "tests/support/gltf_writer.h"
+#include "tests/support/recording.h"
+
+namespace emberlock::apply {
+namespace {
+
+namespace fs = std::filesystem;
+using test::GltfText;
+using testing::ElementsAre;
+using testing::FloatNear;
+using testing::HasSubstr;
+
+class GltfFileTest : public testing::Test {
+ protected:
+  Result<GltfScene> read(const std::string& text, const Placement& place = {}) {
+    const fs::path file = temp_ / "room.gltf";
+    std::ofstream(file, std::ios::binary) << text;
+    mesh_ = {};
+    return read_gltf(file, place, mesh_);
+  }
+  void expect_refused(const std::string& text, const std::string& words) {
+    const auto scene = read(text);
+    ASSERT_FALSE(scene.ok()) << words;
+    EXPECT_EQ(scene.error().kind, ErrorKind::bad_input);
+    EXPECT_THAT(scene.error().message(), HasSubstr(words));
+    EXPECT_THAT(scene.error().message(), HasSubstr("room.gltf"));
+  }
+  void expect_vertex(std::size_t i, float x, float y, float z) {
+    EXPECT_THAT(mesh_.vertices.at(i),
+                ElementsAre(FloatNear(x, 1e-5F), FloatNear(y, 1e-5F), FloatNear(z, 1e-5F)));
+  }
+
+  test::TempFolder temp_;
+  Mesh mesh_;
+};
+
+/// Up in the file (y) is up in the world (z); what is towards the viewer there (z) is -y.
+TEST_F(GltfFileTest, TrianglesStandWhereTheirNodesDo) {
+  GltfText gltf;
+  gltf.corners = {0, 0, 0, 1, 0, 0, 0, 2, 3};
+  gltf.nodes = R"([{"children": [1], "translation": [0, 10, 0], "scale": [2, 2, 2]},
+                   {"mesh": 0, "rotation": [0, 0.70710678, 0, 0.70710678]}])";
+  Placement place;
+  place.translation = {100, 0, 0};
+  const auto scene = read(gltf.text(), place);
+  ASSERT_TRUE(scene.ok()) << scene.error().message();
+  ASSERT_EQ(mesh_.triangles.size(), 1U);
+  expect_vertex(0, 100, 0, 10);
+  expect_vertex(1, 100, 2, 10);  // x goes to -z around y, and that is the world's y
+  expect_vertex(2, 106, 0, 14);
+  EXPECT_TRUE(scene->notes.empty());
+}
+
+TEST_F(GltfFileTest, MaterialsHaveTheFactorsOfTheirColours) {
+  GltfText gltf;
+  gltf.further = R"("materials": [{"pbrMetallicRoughness": {"baseColorFactor": [0.5, 0.25, 0, 1]},
+      "emissiveFactor": [1, 0, 0.5], "alphaMode": "BLEND",
+      "extensions": {"KHR_materials_emissive_strength": {"emissiveStrength": 2}}}])";
+  const auto scene = read(gltf.text());
+  ASSERT_TRUE(scene.ok()) << scene.error().message();
+  const Material& m = mesh_.materials.at(mesh_.material.at(0));
+  EXPECT_THAT(m.albedo, ElementsAre(0.5F, 0.25F, 0));
+  EXPECT_THAT(m.emitted, ElementsAre(510, 0, 255));
+  EXPECT_THAT(scene->notes, ElementsAre(HasSubstr("opaque")));
+}
+
+TEST_F(GltfFileTest, ASecondFileKeepsItsOwnMaterials) {
+  GltfText gltf;
+  ASSERT_TRUE(read(gltf.text()).ok());
+  gltf.further = R"("materials": [{"pbrMetallicRoughness": {"baseColorFactor": [0.5, 0.5, 0.5, 1]}}])";
+  std::ofstream(temp_ / "other.gltf", std::ios::binary) << gltf.text();
+  ASSERT_TRUE(read_gltf(temp_ / "other.gltf", {}, mesh_).ok());
+  EXPECT_EQ(mesh_.triangles.at(1)[0], 3U);
+  EXPECT_EQ(mesh_.materials.at(mesh_.material.at(0)).albedo[0], 1);
+  EXPECT_EQ(mesh_.materials.at(mesh_.material.at(1)).albedo[0], 0.5F);
+}
+
+TEST_F(GltfFileTest, FlamesAndCamerasAreTaken) {
+  GltfText gltf;
+  gltf.nodes =
+      R"([{"mesh": 0}, {"translation": [1, 2, 3], "scale": [2, 2, 2], "extras": {"emberlock_flame": "fire"}},
+                   {"camera": 0, "translation": [0, 5, 0]}])";
+  gltf.roots = "[0, 1, 2]";
+  gltf.further =
+      R"("materials": [{}], "cameras": [{"type": "perspective", "perspective": {"yfov": 0.7, "znear": 0.1}}])";
+  const auto scene = read(gltf.text());
+  ASSERT_TRUE(scene.ok()) << scene.error().message();
+  ASSERT_EQ(scene->flames.size(), 1U);
+  EXPECT_EQ(scene->flames[0].result, "fire");
+  // Its own z is up, as the world's.
+  EXPECT_TRUE(
+      (scene->flames[0].world_from_flame * Eigen::Vector3d(0, 0, 1)).isApprox(Eigen::Vector3d(1, -3, 4)));
+  ASSERT_EQ(scene->cameras.size(), 1U);
+  // It looks along the file's -z, which is the world's y; the picture's down is the world's.
+  const Placement& camera = scene->cameras[0].world_from_camera;
+  EXPECT_TRUE(camera.translation.isApprox(Eigen::Vector3d(0, 0, 5)));
+  EXPECT_TRUE((camera.rotation * Eigen::Vector3d::UnitZ()).isApprox(Eigen::Vector3d::UnitY()));
+  EXPECT_TRUE((camera.rotation * Eigen::Vector3d::UnitY()).isApprox(-Eigen::Vector3d::UnitZ()));
+}
+
+TEST_F(GltfFileTest, RefusesNodesThatFormNoTree) {
+  GltfText gltf;
+  gltf.nodes = R"([{"children": [1]}, {"mesh": 0, "children": [0]}])";
+  expect_refused(gltf.text(), "reached twice");
+  gltf.nodes = R"([{"children": [1, 1]}, {"mesh": 0}])";
+  expect_refused(gltf.text(), "reached twice");
+  gltf.nodes = R"([{"children": [7]}])";
+  expect_refused(gltf.text(), "node 7 isn't there");
+  std::string chain = "[";
+  for (int i = 1; i < 3000; ++i) chain += R"({"children": [)" + std::to_string(i) + "]},";
+  gltf.nodes = chain + R"({"mesh": 0}])";
+  expect_refused(gltf.text(), "too deep");
+}
+
+TEST_F(GltfFileTest, RefusesWhatIsNotFinite) {
+  GltfText gltf;
+  gltf.corners[4] = std::numeric_limits<float>::quiet_NaN();
+  expect_refused(gltf.text(), "isn't finite");
+  gltf = {};
+  gltf.nodes = R"([{"mesh": 0, "translation": [1e30, 0, 0]}])";
+  expect_refused(gltf.text(), "isn't finite");
+  gltf.nodes = R"([{"mesh": 0, "rotation": [0, 0, 0, 0]}])";
+  const auto scene = read(gltf.text());
+  EXPECT_TRUE(!scene.ok() || std::isfinite(mesh_.vertices.at(1)[0]));
+}
+
+TEST_F(GltfFileTest, RefusesBuffersThatAreMissingOrShort) {
+  GltfText gltf;
+  gltf.uri = "nowhere.bin";
+  expect_refused(gltf.text(), "nowhere.bin");
+  gltf = {};
+  gltf.told_points = 4;
+  expect_refused(gltf.text(), "goes beyond its buffer");
+  gltf.told_points = std::size_t{1} << 60;
+  expect_refused(gltf.text(), "");
+  gltf = {};
+  gltf.indices = {0, 1, 3};
+  expect_refused(gltf.text(), "corner isn't there");
+}
+
+TEST_F(GltfFileTest, RefusesABinaryFileThatIsCutShortAnywhere) {
+  const auto whole = read_file(fs::path(EMBERLOCK_SOURCE_DIR) / "tests/fuzz/corpus/gltf_file/all.glb");
+  ASSERT_TRUE(whole.ok());
+  const auto scene = read(*whole);
+  ASSERT_TRUE(scene.ok()) << scene.error().message();
+  EXPECT_EQ(mesh_.triangles.size(), 1U);
+  for (std::size_t size = 0; size < whole->size(); size += 7) expect_refused(whole->substr(0, size), "");
+}
+
+TEST_F(GltfFileTest, RefusesWhatItCannotShow) {
+  GltfText gltf;
+  gltf.further = R"("materials": [{}], "extensionsUsed": ["KHR_draco_mesh_compression"],
+                    "extensionsRequired": ["KHR_draco_mesh_compression"])";
+  expect_refused(gltf.text(), "KHR_draco_mesh_compression");
+  gltf = {};
+  gltf.primitive = R"("material": 0, "mode": 5)";
+  expect_refused(gltf.text(), "strips");
+  gltf.primitive = R"("material": 9)";
+  expect_refused(gltf.text(), "material 9 isn't there");
+  gltf = {};
+  gltf.further = R"("materials": [{"pbrMetallicRoughness": {"baseColorFactor": [2, 0, 0, 1]}}])";
+  expect_refused(gltf.text(), "out of range");
+  gltf = {};
+  gltf.nodes = R"([{"scale": [1, 2, 1], "extras": {"emberlock_flame": "fire"}}])";
+  expect_refused(gltf.text(), "stretched");
+  for (const char* text : {"", "{", "[]", "{}", "glTF", R"({"asset": {"version": "2.0"}})"})
+    expect_refused(text, "");
+  expect_refused(std::string(100000, '['), "");
+}
+
+/// A mesh of twenty thousand triangles, shown by so many nodes that there would be ten million.
+TEST_F(GltfFileTest, RefusesMoreTrianglesThanItHolds) {
+  GltfText gltf;
+  gltf.indices.assign(60000, 0);
+  gltf.nodes = "[";
+  gltf.roots = "[";
+  for (int i = 0; i < 500; ++i) {
+    gltf.nodes += std::string(i > 0 ? "," : "") + R"({"mesh": 0})";
+    gltf.roots += (i > 0 ? "," : "") + std::to_string(i);
+  }
+  gltf.nodes += "]";
+  gltf.roots += "]";
+  expect_refused(gltf.text(), "more than 5000000 triangles");
+}
+
+TEST_F(GltfFileTest, PointsAndLinesAreLeftOutAndTold) {
+  GltfText gltf;
+  gltf.primitive = R"("material": 0, "mode": 1)";
+  const auto scene = read(gltf.text());
+  ASSERT_TRUE(scene.ok()) << scene.error().message();
+  EXPECT_TRUE(mesh_.triangles.empty());
+  EXPECT_THAT(scene->notes, ElementsAre(HasSubstr("lines")));
+}
+
+}  // namespace
+}  // namespace emberlock::apply

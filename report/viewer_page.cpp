@@ -129,7 +129,8 @@ std::string replaced(std::string text, std::string_view what, std::string_view b
 Result<PackedGrid> packed(const recon::Grid& grid, const recon::SharedGrid& values, Stored stored) {
   const std::size_t lanes = values.values.size() / grid.size();
   if ((lanes != 1 && lanes != 3) || values.values.size() != lanes * grid.size())
-    return Error{ErrorKind::bad_input, fmt::format("has {} values at {} key points", values.values.size(), grid.size()),
+    return Error{ErrorKind::bad_input,
+                 fmt::format("has {} values at {} key points", values.values.size(), grid.size()),
                  values.name};
   if (!std::all_of(values.values.begin(), values.values.end(), [](float v) { return std::isfinite(v); }))
     return Error{ErrorKind::bad_input, "has values that aren't finite", values.name,
@@ -143,10 +144,13 @@ Result<PackedGrid> packed(const recon::Grid& grid, const recon::SharedGrid& valu
 
 Status ViewerPage::add_frame(const recon::SharedVolume& volume) {
   if (volume.find("emission") == nullptr)
-    return Error{ErrorKind::bad_input, "has no emission", "volume", "Name a result of `emberlock reconstruct`"};
+    return Error{ErrorKind::bad_input, "has no emission", "volume",
+                 "Name a result of `emberlock reconstruct`"};
   Frame frame{volume.grid, volume.provenance.frame, {}};
   std::vector<std::string> blocks;
   for (const recon::SharedGrid& grid : volume.grids) {
+    const bool tells = std::any_of(grid.values.begin(), grid.values.end(), [](float v) { return v != 0; });
+    if (!tells && grid.name != "emission") continue;
     EMBERLOCK_ASSIGN_OR_RETURN(const PackedGrid values, packed(volume.grid, grid, stored_));
     frame.channels.push_back({grid.name, grid.unit, grid.values.size() / volume.grid.size(), values.scale});
     blocks.push_back(base64(deflated(values.bytes)));
@@ -170,12 +174,12 @@ std::string ViewerPage::header() const {
                           {"scale", c.scale},
                           {"block", block++}});
     const float* at = f.grid.origin;
-    frames.push_back(
-        {{"frame", f.number ? json(*f.number) : json()},
-         {"points", json::array({f.grid.nx, f.grid.ny, f.grid.nz})},
-         {"edge", f.grid.edge},
-         {"origin", triple(static_cast<double>(at[0]), static_cast<double>(at[1]), static_cast<double>(at[2]))},
-         {"channels", std::move(channels)}});
+    frames.push_back({{"frame", f.number ? json(*f.number) : json()},
+                      {"points", json::array({f.grid.nx, f.grid.ny, f.grid.nz})},
+                      {"edge", f.grid.edge},
+                      {"origin", triple(static_cast<double>(at[0]), static_cast<double>(at[1]),
+                                        static_cast<double>(at[2]))},
+                      {"channels", std::move(channels)}});
   }
   json& cameras = told["cameras"] = json::array();
   for (const ViewerCamera& camera : cameras_) cameras.push_back(camera_json(camera));
@@ -192,7 +196,8 @@ std::string ViewerPage::html(const ViewerProgram& program) const {
   std::string html =
       "<!DOCTYPE html>\n<html lang=\"en\"><head><meta charset=\"utf-8\">\n"
       "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n"
-      "<meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; script-src 'unsafe-inline'; "
+      "<meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; script-src "
+      "'unsafe-inline'; "
       "style-src 'unsafe-inline'; img-src data: blob:; media-src blob:\">\n<title>" +
       html_escape(title_) + "</title>\n<style>" + replaced(program.style, "</", "<\\/") +
       "</style></head>\n<body><noscript><p>This page shows its volume by a script.</p></noscript>\n"

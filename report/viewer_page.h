@@ -55,15 +55,16 @@ struct ViewerProgram {
   std::string script, style;
 };
 
-/// A page that shows a result's volumes to turn, in slices and over time, its cameras and its errors. It needs
-/// no other file, no server and no network.
+/// A page that shows a result's volumes to turn, in slices and over time, its cameras and its errors. It
+/// needs no other file, no server and no network.
 class ViewerPage {
  public:
   /// `up` points up in the world, unit length.
   ViewerPage(std::string title, std::string input, const Eigen::Vector3d& up, Stored stored)
       : title_(std::move(title)), input_(std::move(input)), up_(up), stored_(stored) {}
 
-  /// The next frame: all grids of a volume. Errors: those of packed(); it has no `emission`.
+  /// The next frame: `emission`, and all other grids that hold anything. Errors: those of packed(); it has no
+  /// `emission`.
   Status add_frame(const recon::SharedVolume& volume);
   void add_camera(ViewerCamera camera) { cameras_.push_back(std::move(camera)); }
   void set_trace(std::vector<ViewerTrace> trace) { trace_ = std::move(trace); }

@@ -9,7 +9,6 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-
 namespace emberlock::report {
 namespace {
 
@@ -39,13 +38,16 @@ recon::SharedGrid corner(std::size_t lanes, float largest) {
 float of_half(std::uint32_t bits) {
   const int exponent = static_cast<int>(bits >> 10 & 31U);
   const auto fraction = static_cast<double>(bits & 1023U);
-  const double size = exponent == 0 ? std::ldexp(fraction, -24) : std::ldexp(1 + fraction / 1024, exponent - 15);
+  const double size =
+      exponent == 0 ? std::ldexp(fraction, -24) : std::ldexp(1 + fraction / 1024, exponent - 15);
   return static_cast<float>((bits & 0x8000U) != 0 ? -size : size);
 }
 
 /// What the header says of the format, read backwards: one value after the other.
 std::vector<float> unpacked(const PackedGrid& from, std::size_t lanes, Stored stored) {
-  const auto byte = [&](std::size_t at) { return static_cast<std::uint32_t>(static_cast<unsigned char>(from.bytes[at])); };
+  const auto byte = [&](std::size_t at) {
+    return static_cast<std::uint32_t>(static_cast<unsigned char>(from.bytes[at]));
+  };
   const int bx = (kGrid.nx + 7) / 8, by = (kGrid.ny + 7) / 8, bz = (kGrid.nz + 7) / 8;
   const auto bricks = static_cast<std::size_t>(bx * by * bz);
   const std::size_t mask = (bricks + 7) / 8;
@@ -70,7 +72,8 @@ std::vector<float> unpacked(const PackedGrid& from, std::size_t lanes, Stored st
       }
       if (inside)
         values[lanes * kGrid.index(i, j, k) + at % lanes] =
-            stored == Stored::half ? of_half(word) * static_cast<float>(from.scale) : std::bit_cast<float>(word);
+            stored == Stored::half ? of_half(word) * static_cast<float>(from.scale)
+                                   : std::bit_cast<float>(word);
     }
     ++filled;
   }
@@ -108,6 +111,16 @@ TEST(ViewerPage, WhatIsEmptyTakesNoRoom) {
   recon::SharedGrid dark{"density", "1/m", "", std::vector<float>(kGrid.size())};
   EXPECT_EQ(packed(kGrid, dark, Stored::float32)->bytes, std::string(2, '\0'));  // 2 x 3 x 2 bricks
   EXPECT_EQ(packed(kGrid, dark, Stored::half)->bytes.size(), 2U);
+}
+
+TEST(ViewerPage, GridsThatTellNothingAreLeftOut) {
+  ViewerPage page("title", "input", Eigen::Vector3d::UnitZ(), Stored::half);
+  recon::SharedVolume volume{kGrid, {corner(3, 1)}, {}};
+  volume.grids.push_back({"density", "1/m", "", std::vector<float>(kGrid.size())});
+  volume.grids.push_back({"temperature", "K", "", std::vector<float>(kGrid.size(), 1500)});
+  ASSERT_TRUE(page.add_frame(volume).ok());
+  EXPECT_THAT(page.html({}), Not(HasSubstr("density")));
+  EXPECT_THAT(page.html({}), HasSubstr(R"("name":"temperature")"));
 }
 
 TEST(ViewerPage, RefusesWhatIsNotFiniteAndWhatDoesNotFit) {

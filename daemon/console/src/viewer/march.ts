@@ -56,6 +56,12 @@ const kValues = 0;
 const kEmptiness = 1;
 const kPalette = 2;
 
+/** Whether there is no GPU. */
+function software(gl: WebGL2RenderingContext): boolean {
+  const told = gl.getExtension('WEBGL_debug_renderer_info');
+  return told !== null && /SwiftShader|llvmpipe|softpipe|Basic Render/i.test(String(gl.getParameter(told.UNMASKED_RENDERER_WEBGL)));
+}
+
 export class March {
   private readonly programs = new Map<string, Program>();
   private readonly values: WebGLTexture;
@@ -66,6 +72,7 @@ export class March {
   private scale: readonly number[] = [1, 1, 1, 1];
   private unit = 1;  // of a quantity's values
   private over = NaN;
+  private readonly wholeFloats: boolean;
   /** Voxel edges from sample to sample, as `emberlock reconstruct --step` has it. */
   stride = 1;
 
@@ -78,6 +85,7 @@ export class March {
       for (const name of [gl.TEXTURE_WRAP_S, gl.TEXTURE_WRAP_T, gl.TEXTURE_WRAP_R]) gl.texParameteri(target, name, gl.CLAMP_TO_EDGE);
       return made;
     };
+    this.wholeFloats = software(gl) && gl.getExtension('OES_texture_float_linear') !== null;
     gl.pixelStorei(gl.UNPACK_ALIGNMENT, 1);
     this.values = texture(kValues, gl.TEXTURE_3D, gl.LINEAR);
     this.leaps = texture(kEmptiness, gl.TEXTURE_3D, gl.NEAREST);
@@ -126,9 +134,9 @@ export class March {
     this.over = NaN;
     gl.activeTexture(gl.TEXTURE0 + kValues);
     gl.bindTexture(gl.TEXTURE_3D, this.values);
-    // Half is filtered everywhere; a quantity of thousands keeps 11 bits, the colours of which show 8.
-    const [inside, format] = {2: [gl.RG16F, gl.RG], 3: [gl.RGB16F, gl.RGB], 4: [gl.RGBA16F, gl.RGBA]}[lanes];
-    gl.texImage3D(gl.TEXTURE_3D, 0, inside!, ...grid.points, 0, format!, gl.FLOAT, texels);
+    // Halves take half the memory, and show more than a screen does; without a GPU each would be converted at each look.
+    const [half, whole, format] = {2: [gl.RG16F, gl.RG32F, gl.RG], 3: [gl.RGB16F, gl.RGB32F, gl.RGB], 4: [gl.RGBA16F, gl.RGBA32F, gl.RGBA]}[lanes];
+    gl.texImage3D(gl.TEXTURE_3D, 0, (this.wholeFloats ? whole : half)!, ...grid.points, 0, format!, gl.FLOAT, texels);
   }
 
   /** Over what is in the picture already. */
@@ -154,8 +162,7 @@ export class March {
     else {
       const [low, high] = [look.low / this.unit, look.high / this.unit];
       gl.uniform4f(at('range'), low, Math.max(high, low + 1e-6), look.depth / Math.max(...grid.points), look.darkest);
-      gl.uniform4f(at('levels'), ...([0, 1, 2, 3].map(n => (look.levels[n] ?? 0) / this.unit) as [number, number, number, number]));
-      gl.uniform1i(at('many'), Math.min(4, look.levels.length));
+      gl.uniform4f(at('levels'), ...([0, 1, 2, 3].map(n => (look.levels[n] ?? 1e30) / this.unit) as [number, number, number, number]));
     }
     gl.viewport(0, 0, width, height);
     gl.enable(gl.BLEND);

@@ -50,7 +50,7 @@ export class ResultPage {
   private readonly orbit: Orbit;
   private readonly reader: Reader;
   private readonly quantities = new Quantities(again => void (again ? this.load(true) : this.redraw()));
-  private readonly slices = new Slices();
+  private readonly slices: Slices;
   private readonly note = el('p', {class: 'note'});
   private readonly fault = el('p', {class: 'fault', role: 'alert', hidden: true});
   private readonly slider = el('input', {type: 'range', min: 0, step: 1, value: 0, 'aria-label': 'Frame of the sequence', oninput: () => this.goTo(this.slider.valueAsNumber)});
@@ -71,6 +71,7 @@ export class ResultPage {
     const size = first.points.map(n => (n - 1) * first.edge) as unknown as Triple;
     const middle = [0, 1, 2].map(axis => first.origin[axis]! + size[axis]! / 2) as unknown as Triple;
     const reach = Math.hypot(...size) / 2;
+    this.slices = new Slices(contents.up);
     this.reader = new Reader(contents.frames, block);
     this.orbit = new Orbit(middle, contents.up, reach);
     this.stage = new Stage(this.canvas, Array.from({length: 256}, (_, value) => heat(value)), this.orbit, middle);
@@ -128,7 +129,7 @@ export class ResultPage {
       else this.stage.march.setQuantity(frame, single(values.get(name)!, channel.lanes));
       this.quantities.tell();
       const [nx, ny, nz] = frame.points;
-      setText(this.note, `${nx - 1} × ${ny - 1} × ${nz - 1} voxels of ${(1000 * frame.edge).toFixed(2)} mm, from ${this.contents.input}`);
+      setText(this.note, `${nx - 1} × ${ny - 1} × ${nz - 1} voxels of ${(1000 * frame.edge).toFixed(2)} mm${this.contents.input ? `, from ${this.contents.input}` : ''}`);
       setText(this.frameLabel, frame.frame === null ? '' : `frame ${frame.frame}`);
       this.sliced = {frame, values: single(values.get(name)!, channel.lanes), unit: channel.unit};
       this.redraw();

@@ -19,8 +19,7 @@ uniform float rows;             // of the picture
 uniform float stride;           // voxel edges
 uniform vec4 scale;             // what the values are times
 uniform vec4 range;             // low, high, depth of the whole volume, colours' darkest
-uniform vec4 levels;            // isotherms
-uniform int many;               // of them
+uniform vec4 levels;            // isotherms, rising; those that aren't used lie beyond all values
 out vec4 colour;
 const float kThrough = 1. / 512.;
 `;
@@ -37,8 +36,8 @@ void main() {
   float through = 1.;
   vec3 light = vec3(0);
   int n = 0, count = from < to ? int(ceil((to - from) / stride)) : 0;
-  float step = count > 0 ? (to - from) / float(count) : 0.;
-  vec3 over = step * way, start = eye + (from + .5 * step) * way;
+  float stretch = count > 0 ? (to - from) / float(count) : 0.;
+  vec3 over = stretch * way, start = eye + (from + .5 * stretch) * way;
   ${begin}
   while (n < count && through > kThrough) {
     vec3 here = start + float(n) * over;
@@ -59,35 +58,40 @@ void main() {
 /** dL = S ds and the extinction in w, as recon's march: L += T S ds phi(x), T *= exp(-x) with x = sigma ds, phi(x) = (1 - exp(-x)) / x. */
 export const kColour = (absorbs: boolean) => kMarch('', absorbs ? `
       vec4 v = scale * at(p);
-      float depth = v.w * step;
+      float depth = v.w * stretch;
       float taken = depth < .03 ? depth * (1. - depth * (.5 - depth / 6.)) : 1. - exp(-depth);
-      light += through * step * (depth > 0. ? taken / depth : 1.) * v.rgb;
+      light += through * stretch * (depth > 0. ? taken / depth : 1.) * v.rgb;
       through *= 1. - taken;` : `
-      light += step * scale.rgb * at(p).rgb;`, `
+      light += stretch * scale.rgb * at(p).rgb;`, `
   colour = vec4(light * range.x / 255., through);`);
 
 /** A quantity in colours, as opaque as it is high: x holds it times y, which is 1 where it is told, so that what isn't told doesn't
  *  mix in. Isotherms are surfaces. */
-export const kQuantity = (levels: boolean) => kMarch(levels ? 'float before = -1e30; vec3 was = start;' : '', `
+export const kQuantity = (levels: boolean) => kMarch(levels ? 'int before = -1; float past = 0.; vec3 was = start;' : '', `
       vec4 v = at(p);
       float told = v.y, value = told > .02 ? v.x / told : -1e30;
       ${levels ? `
-      for (int m = 0; m < many && before > -1e29 && value > -1e29; ++m) {
-        if ((before - levels[m]) * (value - levels[m]) > 0. || before == value) continue;
-        vec3 q = mix(was, p, (levels[m] - before) / (value - before));
-        vec4 a = at(q + vec3(1, 0, 0)), b = at(q - vec3(1, 0, 0)), c = at(q + vec3(0, 1, 0)), d = at(q - vec3(0, 1, 0)),
-             e = at(q + vec3(0, 0, 1)), f = at(q - vec3(0, 0, 1));
-        vec3 slope = vec3(a.x / max(a.y, .02) - b.x / max(b.y, .02), c.x / max(c.y, .02) - d.x / max(d.y, .02),
-                          e.x / max(e.y, .02) - f.x / max(f.y, .02));
-        float facing = abs(dot(slope, way)) / max(length(slope), 1e-9);
-        float share = clamp((levels[m] - range.x) / (range.y - range.x), 0., 1.);
-        light += through * .7 * (.35 + .65 * facing) * texture(colours, vec2(mix(range.w, 1., share), .5)).rgb;
-        through *= .3;
+      int band = value < -1e29 ? -1 : int(dot(step(levels, vec4(value)), vec4(1)));
+      if (band != before) {
+        int up = band > before ? 1 : -1;
+        if (band >= 0 && before >= 0) for (int m = before; m != band; m += up) {
+          float level = levels[min(m, m + up)];
+          vec3 q = mix(was, p, (level - past) / (value - past));
+          vec4 a = at(q + vec3(1, 0, 0)), b = at(q - vec3(1, 0, 0)), c = at(q + vec3(0, 1, 0)), d = at(q - vec3(0, 1, 0)),
+               e = at(q + vec3(0, 0, 1)), f = at(q - vec3(0, 0, 1));
+          vec3 slope = vec3(a.x / max(a.y, .02) - b.x / max(b.y, .02), c.x / max(c.y, .02) - d.x / max(d.y, .02),
+                            e.x / max(e.y, .02) - f.x / max(f.y, .02));
+          float facing = abs(dot(slope, way)) / max(length(slope), 1e-9);
+          float share = clamp((level - range.x) / (range.y - range.x), 0., 1.);
+          light += through * .7 * (.35 + .65 * facing) * texture(colours, vec2(mix(range.w, 1., share), .5)).rgb;
+          through *= .3;
+        }
+        before = band;
       }
-      before = value; was = p;` : ''}
+      past = value; was = p;` : ''}
       float share = (value - range.x) / (range.y - range.x);
       if (share > 0.) {
-        float opaque = 1. - exp(-range.z * told * min(share, 1.) * step);
+        float opaque = 1. - exp(-range.z * told * min(share, 1.) * stretch);
         light += through * opaque * texture(colours, vec2(mix(range.w, 1., min(share, 1.)), .5)).rgb;
         through *= 1. - opaque;
       }`, `

@@ -2,6 +2,7 @@
 // Slices through a quantity across x, y and z, with a colour bar, isotherms as lines, and the value below the pointer.
 import {el, setText} from '../dom';
 import {heat} from '../layers';
+import type {Triple} from './contents';
 import type {GridPlace} from './march';
 
 /** What is drawn in a slice: values from low to high, lines at levels. Values that aren't above 0 aren't told. */
@@ -15,7 +16,15 @@ export interface Told {
 }
 
 const kNames = ['x', 'y', 'z'] as const;
-const kAcross = [[1, 2], [0, 2], [0, 1]] as const;  // to the right and upwards in a slice across x, y, z
+type AxisIndex = 0 | 1 | 2;
+
+/** The axes to the right and upwards in a slice, and whether the latter points down: what is up in the world is up. */
+export function axesOf(across: AxisIndex, up: Triple): {right: AxisIndex; upwards: AxisIndex; down: boolean} {
+  const vertical = up.map(Math.abs).indexOf(Math.max(...up.map(Math.abs))) as AxisIndex;
+  const [first, second] = ([0, 1, 2] as const).filter(axis => axis !== across) as [AxisIndex, AxisIndex];
+  return vertical === first ? {right: second, upwards: first, down: up[vertical] < 0}
+                            : {right: first, upwards: second, down: vertical === second && up[vertical] < 0};
+}
 
 /** A value with its unit, in as many digits as can be read. */
 export function words(value: number, unit: string): string {
@@ -30,7 +39,10 @@ class Slice {
   private told?: Told;
   readonly root: HTMLElement;
 
-  constructor(private readonly axis: 0 | 1 | 2, private readonly say: (text: string) => void) {
+  private readonly axes: ReturnType<typeof axesOf>;
+
+  constructor(private readonly axis: AxisIndex, up: Triple, private readonly say: (text: string) => void) {
+    this.axes = axesOf(axis, up);
     this.slider = el('input', {type: 'range', min: 0, max: 1, step: 1, 'aria-label': `Place of the slice across ${kNames[axis]}`, oninput: () => this.draw()});
     this.canvas.addEventListener('pointermove', event => this.point(event));
     this.canvas.addEventListener('pointerleave', () => say(''));
@@ -50,13 +62,14 @@ class Slice {
   private at(right: number, up: number): number {
     const {points} = this.told!.grid;
     const place = [0, 0, 0];
-    [place[this.axis], place[kAcross[this.axis][0]], place[kAcross[this.axis][1]]] = [this.slider.valueAsNumber, right, up];
+    const {upwards, down} = this.axes;
+    [place[this.axis], place[this.axes.right], place[upwards]] = [this.slider.valueAsNumber, right, down ? points[upwards] - 1 - up : up];
     return this.told!.values[place[0]! + points[0] * (place[1]! + points[1] * place[2]!)]!;
   }
 
   private draw(): void {
     const {grid, low, high, levels, unit} = this.told!;
-    const [width, height] = kAcross[this.axis].map(axis => grid.points[axis]) as [number, number];
+    const [width, height] = [grid.points[this.axes.right], grid.points[this.axes.upwards]];
     const place = grid.origin[this.axis] + grid.edge * this.slider.valueAsNumber;
     setText(this.label, `across ${kNames[this.axis]} at ${(1000 * place).toFixed(1)} mm`);
     Object.assign(this.canvas, {width, height});
@@ -90,8 +103,14 @@ class Slice {
 
 export class Slices {
   private readonly below = el('output', {class: 'below'});
-  private readonly slices = ([0, 1, 2] as const).map(axis => new Slice(axis, text => setText(this.below, text)));
-  readonly root = el('div', {class: 'slices-part'}, el('div', {class: 'slices'}, ...this.slices.map(slice => slice.root)), this.below);
+  private readonly slices: Slice[];
+  readonly root: HTMLElement;
+
+  /** `up` points up in the world. */
+  constructor(up: Triple) {
+    this.slices = ([0, 1, 2] as const).map(axis => new Slice(axis, up, text => setText(this.below, text)));
+    this.root = el('div', {class: 'slices-part'}, el('div', {class: 'slices'}, ...this.slices.map(slice => slice.root)), this.below);
+  }
 
   show(told: Told): void {
     for (const slice of this.slices) slice.show(told);

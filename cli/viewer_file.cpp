@@ -80,7 +80,8 @@ std::string picture_uri(const Image& picture) {
 /// A view's picture as the result has it; empty where it isn't there or of another size.
 std::string rendered_uri(const fs::path& folder, std::size_t view, ImageSize size) {
   const auto picture = session::read_image(folder / "views" / fmt::format("{:04}.png", view));
-  const bool fits = picture && picture->layout().size == size && picture->layout().format == PixelFormat::rgb8;
+  const bool fits =
+      picture && picture->layout().size == size && picture->layout().format == PixelFormat::rgb8;
   return fits ? picture_uri(*picture) : std::string();
 }
 
@@ -92,12 +93,13 @@ json told_view(const json& told, std::size_t n) {
 }
 
 /// The cameras of the first volume and what they saw of it.
-Status add_cameras(report::ViewerPage& page, const ResultVolume& volume, const json& told, const recon::Grid& grid,
-                   const ViewerOptions& options) {
+Status add_cameras(report::ViewerPage& page, const ResultVolume& volume, const json& told,
+                   const recon::Grid& grid, const ViewerOptions& options) {
   const fs::path folder = volume.file.parent_path();
   const std::string input = options.input.empty() ? reported(folder, "input") : options.input;
   if (input.empty())
-    return Error{ErrorKind::bad_input, "doesn't tell what was reconstructed", (folder / "report.json").string()};
+    return Error{ErrorKind::bad_input, "doesn't tell what was reconstructed",
+                 (folder / "report.json").string()};
   recon::SceneOptions scene_options;
   scene_options.box = recon::box_of(grid);
   if (volume.frame) scene_options.frame = static_cast<std::size_t>(*volume.frame);
@@ -138,8 +140,8 @@ Result<std::string> viewer_html(const fs::path& result, const std::vector<Result
   const json told = report_of(folder);
   EMBERLOCK_ASSIGN_OR_RETURN(const Eigen::Vector3d up, up_axis("", first.file));
   const std::string name = fs::absolute(result).lexically_normal().filename().string();
-  report::ViewerPage page("Emberlock: " + (name.empty() ? result.string() : name), reported(first.file, "input"),
-                          up, options.stored);
+  report::ViewerPage page("Emberlock: " + (name.empty() ? result.string() : name),
+                          reported(first.file, "input"), up, options.stored);
   std::optional<recon::Grid> grid;
   const Progress bar = progress_bar("view");
   for (std::size_t n = 0; n < volumes.size(); ++n) {
@@ -152,8 +154,7 @@ Result<std::string> viewer_html(const fs::path& result, const std::vector<Result
   page.set_trace(trace_of(told));
   if (const Status cameras = add_cameras(page, first, told, *grid, options); !cameras.ok()) {
     const Error& e = cameras.error();
-    std::fprintf(stderr, "%-16s no cameras are shown: %s %s\n", "warning", e.where.c_str(),
-                 e.what.c_str());
+    std::fprintf(stderr, "%-16s no cameras are shown: %s %s\n", "warning", e.where.c_str(), e.what.c_str());
   }
   tell(bar, 1, "done");
   return page.html(program);

@@ -14,8 +14,9 @@ namespace emberlock::cli {
 
 struct ViewerOptions {
   report::Stored stored = report::Stored::half;
-  std::string input = {};  ///< session or transforms.json whose cameras are shown; empty: what was reconstructed
-  std::string rig = {};    ///< rig.json that stands before a session's own calibration
+  std::string input =
+      {};  ///< session or transforms.json whose cameras are shown; empty: what was reconstructed
+  std::string rig = {};  ///< rig.json that stands before a session's own calibration
 };
 
 /// The viewer's script and style, where its build or package put them beside this program. Error (io): they

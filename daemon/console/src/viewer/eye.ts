@@ -55,7 +55,7 @@ export class Orbit {
   distance: number;
   private readonly axes: [Triple, Triple];
 
-  constructor(private readonly about: Triple, private readonly up: Triple, private readonly reach: number) {
+  constructor(readonly about: Triple, private readonly up: Triple, private readonly reach: number) {
     this.axes = level(up);
     this.distance = 3.2 * reach;
   }

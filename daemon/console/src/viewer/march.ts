@@ -10,14 +10,15 @@ export interface ColourLook {
   mode: 'colour';
   gain: number;
 }
-/** A quantity from `low` on, in colours from `darkest` (0..1) on; `depth`: what the brightest colour would
- *  take of the light along the volume's longest edge (optical depth). */
+/** A quantity from `low` on in the palette's colours from `darkest` (0..1) on; `depth`: what it takes of the light along the volume's
+ *  longest edge (optical depth), at its highest, or `even` wherever it is told. Isotherms are at `levels`, which rise. */
 export interface QuantityLook {
   mode: 'quantity';
   low: number;
   high: number;
   depth: number;
   darkest: number;
+  even?: boolean;
   levels: readonly number[];
 }
 export type Look = ColourLook | QuantityLook;
@@ -76,7 +77,7 @@ export class March {
   /** Voxel edges from sample to sample, as `emberlock reconstruct --step` has it. */
   stride = 1;
 
-  constructor(readonly gl: WebGL2RenderingContext, palette: readonly (readonly [number, number, number])[]) {
+  constructor(readonly gl: WebGL2RenderingContext) {
     const texture = (unit: number, target: GLenum, filter: GLenum) => {
       const made = gl.createTexture();
       gl.activeTexture(gl.TEXTURE0 + unit);
@@ -90,7 +91,13 @@ export class March {
     this.values = texture(kValues, gl.TEXTURE_3D, gl.LINEAR);
     this.leaps = texture(kEmptiness, gl.TEXTURE_3D, gl.NEAREST);
     texture(kPalette, gl.TEXTURE_2D, gl.LINEAR);
-    const bytes = Uint8Array.from(palette.flatMap(rgb => [...rgb, 255]));
+  }
+
+  /** The colours of a quantity, from its lowest to its highest: red, green and blue, 0..255. */
+  setPalette(palette: readonly (readonly number[])[]): void {
+    const {gl} = this;
+    const bytes = Uint8Array.from(palette.flatMap(([red, green, blue]) => [red!, green!, blue!, 255]));
+    gl.activeTexture(gl.TEXTURE0 + kPalette);
     gl.texImage2D(gl.TEXTURE_2D, 0, gl.RGBA8, palette.length, 1, 0, gl.RGBA, gl.UNSIGNED_BYTE, bytes);
   }
 
@@ -115,16 +122,17 @@ export class March {
     this.take(grid, texels, lanes, any);
   }
 
-  /** A quantity at each point; what isn't above 0 is not told. */
-  setQuantity(grid: GridPlace, values: Float32Array): void {
+  /** A quantity at each point; what isn't above 0 is not told. Its opacity can have a weight at each point, 0..1. */
+  setQuantity(grid: GridPlace, values: Float32Array, weight: (point: number) => number = () => 1): void {
     const texels = new Float32Array(2 * values.length);
     this.unit = largest(values) || 1;
     values.forEach((value, point) => {
       if (!(value > 0)) return;
-      texels[2 * point] = value / this.unit;
-      texels[2 * point + 1] = 1;
+      const told = weight(point);
+      texels[2 * point] = told * value / this.unit;
+      texels[2 * point + 1] = told;
     });
-    this.take(grid, texels, 2, point => texels[2 * point]!);
+    this.take(grid, texels, 2, point => texels[2 * point + 1]! > 0 ? values[point]! / this.unit : 0);
   }
 
   private take(grid: GridPlace, texels: Float32Array, lanes: 2 | 3 | 4, most: (point: number) => number): void {
@@ -161,6 +169,7 @@ export class March {
     if (look.mode === 'colour') gl.uniform4f(at('range'), look.gain, 0, 0, 0);
     else {
       const [low, high] = [look.low / this.unit, look.high / this.unit];
+      gl.uniform1f(at('even'), look.even ? 1 : 0);
       gl.uniform4f(at('range'), low, Math.max(high, low + 1e-6), look.depth / Math.max(...grid.points), look.darkest);
       gl.uniform4f(at('levels'), ...([0, 1, 2, 3].map(n => (look.levels[n] ?? 1e30) / this.unit) as [number, number, number, number]));
     }

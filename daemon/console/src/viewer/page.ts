@@ -74,7 +74,8 @@ export class ResultPage {
     this.slices = new Slices(contents.up);
     this.reader = new Reader(contents.frames, block);
     this.orbit = new Orbit(middle, contents.up, reach);
-    this.stage = new Stage(this.canvas, Array.from({length: 256}, (_, value) => heat(value)), this.orbit, middle);
+    this.stage = new Stage(this.canvas, this.orbit);
+    this.stage.march.setPalette(Array.from({length: 256}, (_, value) => heat(value)));
     this.root = el('main', {class: 'viewer'});
     this.build(reach);
   }

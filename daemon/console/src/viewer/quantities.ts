@@ -125,7 +125,7 @@ export class Quantities {
     const levels = this.levels.map(level => words(level, this.unit)).join(', ');
     const look = this.look;
     for (const [input, text] of [[this.gain, `${(2 ** (this.gain.valueAsNumber / 10)).toFixed(2)} times`], [this.low, words(low, this.unit)], [this.high, words(high, this.unit)],
-                                 [this.depth, look.mode === 'quantity' ? `depth ${look.depth.toPrecision(2)}` : ''], [this.count, levels || 'none']] as const) {
+                                 [this.depth, look.mode === 'quantity' && look.depth > 0 ? `depth ${look.depth.toPrecision(2)}` : 'none'], [this.count, levels || 'none']] as const) {
       setText(this.said.get(input)!, text);
       set(input, 'aria-valuetext', text);
     }

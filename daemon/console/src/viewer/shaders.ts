@@ -19,6 +19,7 @@ uniform float rows;             // of the picture
 uniform float stride;           // voxel edges
 uniform vec4 scale;             // what the values are times
 uniform vec4 range;             // low, high, depth of the whole volume, colours' darkest
+uniform float even;             // 1: as opaque wherever it is told
 uniform vec4 levels;            // isotherms, rising; those that aren't used lie beyond all values
 out vec4 colour;
 const float kThrough = 1. / 512.;
@@ -91,7 +92,7 @@ export const kQuantity = (levels: boolean) => kMarch(levels ? 'int before = -1; 
       past = value; was = p;` : ''}
       float share = (value - range.x) / (range.y - range.x);
       if (share > 0.) {
-        float opaque = 1. - exp(-range.z * told * min(share, 1.) * stretch);
+        float opaque = 1. - exp(-range.z * told * mix(min(share, 1.), 1., even) * stretch);
         light += through * opaque * texture(colours, vec2(mix(range.w, 1., min(share, 1.)), .5)).rgb;
         through *= 1. - opaque;
       }`, `

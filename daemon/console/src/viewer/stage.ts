@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The canvas in which the volume stands: what is drawn and when, and how it is turned by mouse, fingers and keys.
 import type {Triple} from './contents';
-import {type Eye, type Orbit} from './eye';
+import type {Eye, Orbit} from './eye';
 import {type Look, March} from './march';
 
 /** What else is drawn, before the volume and over it. */
@@ -30,11 +30,11 @@ export class Stage {
   private readonly fingers = new Map<number, PointerEvent>();
   private travelled = 0;
 
-  constructor(readonly canvas: HTMLCanvasElement, palette: readonly (readonly [number, number, number])[], readonly orbit: Orbit, private readonly middle: Triple) {
+  constructor(readonly canvas: HTMLCanvasElement, public orbit: Orbit) {
     const gl = canvas.getContext('webgl2', {antialias: false, alpha: false, preserveDrawingBuffer: true});
     if (!gl) throw new Error('this browser has no WebGL 2');
     this.gl = gl;
-    this.march = new March(gl, palette);
+    this.march = new March(gl);
     new ResizeObserver(() => this.later()).observe(canvas);
     this.listen();
   }
@@ -69,9 +69,9 @@ export class Stage {
     gl.viewport(0, 0, width, height);
     gl.clearColor(0, 0, 0, 1);
     gl.clear(gl.COLOR_BUFFER_BIT);
-    for (const one of this.company) one.draw(eye, width, height, this.middle, true);
+    for (const one of this.company) one.draw(eye, width, height, this.orbit.about, true);
     this.march.draw(eye, this.look, width, height);
-    for (const one of this.company) one.draw(eye, width, height, this.middle, false);
+    for (const one of this.company) one.draw(eye, width, height, this.orbit.about, false);
     gl.readPixels(0, 0, 1, 1, gl.RGBA, gl.UNSIGNED_BYTE, new Uint8Array(4));  // waits until it is there
     const took = performance.now() - begin;
     if (moving) this.coarse = Math.max(1, Math.min(4, this.coarse * Math.sqrt(took / kSlow)));
@@ -79,7 +79,8 @@ export class Stage {
     return took;
   }
 
-  private move(turn: number, tilt: number, zoom: number): void {
+  /** By degrees around the upright axis and over it, and so many times as near. */
+  move(turn: number, tilt: number, zoom: number): void {
     this.fixed = undefined;
     this.orbit.by(turn, tilt);
     this.orbit.zoom(zoom);
@@ -111,7 +112,7 @@ export class Stage {
       else if (this.travelled >= 4) this.move(-0.5 * x, 0.5 * y, 1);
     });
     canvas.addEventListener('wheel', event => {
-      if (document.activeElement !== canvas) return;  // else the page scrolls
+      if (!canvas.closest(':focus')) return;  // else the page scrolls
       event.preventDefault();
       this.move(0, 0, 2 ** (-event.deltaY / 400));
     }, {passive: false});

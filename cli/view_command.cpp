@@ -116,13 +116,17 @@ Status view(const ViewArguments& a, const CLI::App& verb) try {
     EMBERLOCK_ASSIGN_OR_RETURN(volumes, volumes_to_view(a.result));
   }
   EMBERLOCK_RETURN_IF_ERROR(check_used(a, verb, !volumes.empty()));
-  if (volumes.empty()) {
+  const Result<report::ViewerProgram> program = viewer_program();
+  const bool instead = !program.ok() && a.out.empty() && page_of(a.result).ok();
+  if (!volumes.empty() && instead)
+    std::fprintf(stderr, "%-16s %s: this is the report\n", "note", program.error().what.c_str());
+  if (volumes.empty() || instead) {
     EMBERLOCK_ASSIGN_OR_RETURN(const fs::path page, page_of(a.result));
     open_page(page);
     return {};
   }
-  EMBERLOCK_ASSIGN_OR_RETURN(const report::ViewerProgram program, viewer_program());
-  EMBERLOCK_ASSIGN_OR_RETURN(const std::string html, viewer_html(a.result, volumes, a.options, program));
+  if (!program.ok()) return program.error();
+  EMBERLOCK_ASSIGN_OR_RETURN(const std::string html, viewer_html(a.result, volumes, a.options, *program));
   const fs::path page = viewer_place(a);
   EMBERLOCK_RETURN_IF_ERROR(write_file_atomically(page, html));
   if (a.out.empty())

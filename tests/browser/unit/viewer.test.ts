@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 import {expect, test} from 'vitest';
 
-import {bricksOf, emptiness, kCells} from '../../../daemon/console/src/viewer/bricks';
+import {bricksOf, emptiness, filledPart, kCells} from '../../../daemon/console/src/viewer/bricks';
 import {difference} from '../../../daemon/console/src/viewer/compare';
 import {type Channel, decode, inflated, type Triple} from '../../../daemon/console/src/viewer/contents';
 import {cross, dot, eyeOf, Orbit, placeOf, seen} from '../../../daemon/console/src/viewer/eye';
@@ -69,6 +69,9 @@ test('bricks know the largest value at any of their points, and how far the next
     expect(away[brick]).toBe(nearest);
   });
   expect(Math.min(...emptiness(bricks, 1e9))).toBe(255);
+  expect(filledPart(bricks, 1e9)).toBeUndefined();
+  const of = (pick: (...values: number[]) => number) => [0, 1, 2].map(axis => pick(...full.map(brick => brick[axis]!)));
+  expect(filledPart(bricks, 0)).toEqual([of(Math.min).map(at => kCells * at), of(Math.max).map(at => kCells * (at + 1))]);
 });
 
 test('an orbit is upright and looks at its middle, whatever is up', () => {

@@ -60,3 +60,17 @@ export function emptiness({size, most}: Bricks, over: number): Uint8Array {
   });
   return away;
 }
+
+/** The lowest and highest corner of all bricks that have more than `over`, in cells. */
+export function filledPart({size, most}: Bricks, over: number): readonly [Triple, Triple] | undefined {
+  const low = [Infinity, Infinity, Infinity];
+  const high = [-Infinity, -Infinity, -Infinity];
+  most.forEach((value, brick) => {
+    if (!(value > over)) return;
+    [brick % size[0], Math.floor(brick / size[0]) % size[1], Math.floor(brick / (size[0] * size[1]))].forEach((at, axis) => {
+      low[axis] = Math.min(low[axis]!, kCells * at);
+      high[axis] = Math.max(high[axis]!, kCells * (at + 1));
+    });
+  });
+  return low[0] === Infinity ? undefined : [low as unknown as Triple, high as unknown as Triple];
+}

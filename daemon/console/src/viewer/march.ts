@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // Draws a volume with WebGL 2.
-import {type Bricks, bricksOf, emptiness, kCells} from './bricks';
+import {type Bricks, bricksOf, emptiness, filledPart, kCells} from './bricks';
 import type {Triple} from './contents';
-import type {Eye} from './eye';
+import {type Eye, seen} from './eye';
 import {kColour, kQuantity, kWhole} from './shaders';
 
 /** Light and what it loses, as a camera would see it: `gain` times as bright. */
@@ -73,6 +73,7 @@ export class March {
   private scale: readonly number[] = [1, 1, 1, 1];
   private unit = 1;  // of a quantity's values
   private over = NaN;
+  private filled?: readonly [Triple, Triple];  // the corners of what isn't empty, in voxel edges
   private readonly wholeFloats: boolean;
   /** Voxel edges from sample to sample, as `emberlock reconstruct --step` has it. */
   stride = 1;
@@ -152,6 +153,8 @@ export class March {
     const {gl, grid} = this;
     if (!this.bricks) return;
     this.look(look);
+    const part = this.partOf(eye, width, height);
+    if (!part) return;
     const {program, at} = this.program(look);
     gl.useProgram(program);
     gl.uniform1i(at('values'), kValues);
@@ -176,7 +179,24 @@ export class March {
     gl.viewport(0, 0, width, height);
     gl.enable(gl.BLEND);
     gl.blendFuncSeparate(gl.ONE, gl.SRC_ALPHA, gl.ZERO, gl.ONE);  // light over what comes through
+    gl.enable(gl.SCISSOR_TEST);
+    gl.scissor(...part);
     gl.drawArrays(gl.TRIANGLES, 0, 3);
+    gl.disable(gl.SCISSOR_TEST);
+  }
+
+  /** Left, bottom, width and height of the picture's part in which what isn't empty is seen. */
+  private partOf(eye: Eye, width: number, height: number): [number, number, number, number] | undefined {
+    if (!this.filled) return undefined;
+    const {grid, filled} = this;
+    const corners = Array.from({length: 8}, (_, n) =>
+      seen(eye, [0, 1, 2].map(axis => grid.origin[axis]! + grid.edge * filled[n >> axis & 1]![axis]!) as unknown as Triple));
+    if (corners.some(([, , far]) => far <= 0)) return [0, 0, width, height];
+    const [left, right, top, bottom] = [Math.min(...corners.map(([x]) => x)), Math.max(...corners.map(([x]) => x)), Math.min(...corners.map(([, y]) => y)), Math.max(...corners.map(([, y]) => y))];
+    const within = (value: number, most: number) => Math.max(0, Math.min(most, value));
+    const [x0, x1] = [within(Math.floor(left) - 1, width), within(Math.ceil(right) + 1, width)];
+    const [y0, y1] = [within(Math.floor(top) - 1, height), within(Math.ceil(bottom) + 1, height)];
+    return x1 > x0 && y1 > y0 ? [x0, height - y1, x1 - x0, y1 - y0] : undefined;
   }
 
   private program(look: Look): Program {
@@ -193,6 +213,7 @@ export class March {
     const over = look.mode === 'colour' ? 0 : Math.max(0, Math.min(look.low, ...look.levels)) / this.unit;
     if (over === this.over) return;
     this.over = over;
+    this.filled = filledPart(this.bricks!, over);
     const {gl} = this;
     gl.activeTexture(gl.TEXTURE0 + kEmptiness);
     gl.bindTexture(gl.TEXTURE_3D, this.leaps);

@@ -9,7 +9,7 @@ import type {Browser, Page} from 'playwright-core';
 import {type Channel, type Contents, type Frame, kBrick, type Triple} from '../../../daemon/console/src/viewer/contents';
 
 export const kViewer = process.env.EMBERLOCK_CONSOLE ?? fileURLToPath(new URL('../../../build/release/console', import.meta.url));
-export const kPrograms = fileURLToPath(new URL('../../../build/release/bin', import.meta.url));
+export const kPrograms = process.env.EMBERLOCK_BIN ?? fileURLToPath(new URL('../../../build/release/bin', import.meta.url));
 
 /** A float32 block of report/viewer_page.h, before it is deflated. */
 export function packed([nx, ny, nz]: Triple, lanes: 1 | 3, values: Float32Array): Uint8Array {

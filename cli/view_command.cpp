@@ -155,7 +155,7 @@ void add_view(CLI::App& app) {
   verb->add_flag("--report", a.report, "Opens the report page instead");
   verb->add_flag_callback(
       "--float32", [&a] { a.options.stored = report::Stored::float32; },
-      "Holds the values bit for bit; otherwise as halves, to 0.05 %, in a page about half as large");
+      "Holds the values bit for bit; otherwise as halves, to 0.05 %, in a smaller page");
   verb->add_option("--input", a.options.input,
                    "Session or transforms.json whose cameras are shown [what was reconstructed]");
   verb->add_option("--rig", a.options.rig, "rig.json that stands before a session's own calibration");

@@ -5,17 +5,22 @@
 #include <cstdlib>
 #include <filesystem>
 #include <memory>
+#include <new>
 #include <string>
 #include <system_error>
 #include <thread>
+#include <vector>
 
 #include <fcntl.h>
 #include <spawn.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include "base/file.h"
 #include "base/result.h"
 #include "cli/commands.h"
+#include "cli/result_files.h"
+#include "cli/viewer_file.h"
 
 namespace emberlock::cli {
 namespace {
@@ -62,8 +67,8 @@ Result<int> start(const char* program, const std::string& argument) {
   return 0;
 }
 
-void view(const fs::path& result) {
-  const fs::path page = or_fail(page_of(result));
+/// In a browser, where there is a display.
+void open_page(const fs::path& page) {
   std::printf("%s\n", page.c_str());
   std::fflush(stdout);
   if (!is_set("DISPLAY") && !is_set("WAYLAND_DISPLAY")) return;
@@ -72,14 +77,89 @@ void view(const fs::path& result) {
     fail({ErrorKind::io, "no browser could be started", page.string(), "Open this file in one"});
 }
 
+struct ViewArguments {
+  std::string result, out;
+  ViewerOptions options;
+  bool report = false;
+};
+
+/// The volumes that a result has; none of a page, and of what is only a report.
+Result<std::vector<ResultVolume>> volumes_to_view(const fs::path& result) {
+  std::error_code ec;
+  if (fs::is_regular_file(result, ec) && result.extension() != ".vdb") return std::vector<ResultVolume>();
+  Result<std::vector<ResultVolume>> volumes = volumes_of(result);
+  if (!volumes.ok() && page_of(result).ok()) return std::vector<ResultVolume>();
+  return volumes;
+}
+
+Status check_used(const ViewArguments& a, const CLI::App& verb, bool viewer) {
+  if (viewer) return {};
+  for (const char* option : {"--out", "--float32", "--input", "--rig"})
+    if (verb.count(option) > 0)
+      return Error{ErrorKind::bad_input, "changes nothing here: there is no volume to show", option,
+                   a.report ? "Leave --report away" : "Name the folder of a reconstruction"};
+  return {};
+}
+
+/// Where the viewer's page goes unasked: into the result's folder.
+fs::path viewer_place(const ViewArguments& a) {
+  if (!a.out.empty()) return fs::absolute(a.out);
+  std::error_code ec;
+  const fs::path folder =
+      fs::is_directory(a.result, ec) ? fs::path(a.result) : fs::path(a.result).parent_path();
+  return fs::absolute(folder / "view.html");
+}
+
+Status view(const ViewArguments& a, const CLI::App& verb) try {
+  std::vector<ResultVolume> volumes;
+  if (!a.report) {
+    EMBERLOCK_ASSIGN_OR_RETURN(volumes, volumes_to_view(a.result));
+  }
+  EMBERLOCK_RETURN_IF_ERROR(check_used(a, verb, !volumes.empty()));
+  const Result<report::ViewerProgram> program = viewer_program();
+  const bool instead = !program.ok() && a.out.empty() && page_of(a.result).ok();
+  if (!volumes.empty() && instead)
+    std::fprintf(stderr, "%-16s %s: this is the report\n", "note", program.error().what.c_str());
+  if (volumes.empty() || instead) {
+    EMBERLOCK_ASSIGN_OR_RETURN(const fs::path page, page_of(a.result));
+    open_page(page);
+    return {};
+  }
+  if (!program.ok()) return program.error();
+  EMBERLOCK_ASSIGN_OR_RETURN(const std::string html, viewer_html(a.result, volumes, a.options, *program));
+  const fs::path page = viewer_place(a);
+  EMBERLOCK_RETURN_IF_ERROR(write_file_atomically(page, html));
+  if (a.out.empty())
+    open_page(page);
+  else
+    std::printf("%s\n", page.c_str());
+  return {};
+} catch (const std::bad_alloc&) {
+  return Error{ErrorKind::bad_input, "not enough memory for all its volumes", a.result,
+               "Give one frame's folder"};
+}
+
 }  // namespace
 
 void add_view(CLI::App& app) {
-  auto result = std::make_shared<std::string>();
+  auto arguments = std::make_shared<ViewArguments>();
+  ViewArguments& a = *arguments;
   CLI::App* verb = app.add_subcommand(
-      "view", "Opens a result's report page in the browser; without a display it only says where it is");
-  verb->add_option("RESULT", *result, "The folder of a result, or a page")->required();
-  verb->callback([result] { view(*result); });
+      "view",
+      "Shows a result in the browser: the volume to turn, in slices and over time, its cameras and errors; "
+      "of results without a volume the report. Without a display it only says where the page is");
+  verb->add_option("RESULT", a.result, "The folder of a result, a volume.vdb, or a page")->required();
+  verb->add_option("--out", a.out,
+                   "HTML file for the page, which needs no other file; it isn't opened then [view.html in "
+                   "the result's folder]");
+  verb->add_flag("--report", a.report, "Opens the report page instead");
+  verb->add_flag_callback(
+      "--float32", [&a] { a.options.stored = report::Stored::float32; },
+      "Holds the values bit for bit; otherwise as halves, to 0.05 %, in a smaller page");
+  verb->add_option("--input", a.options.input,
+                   "Session or transforms.json whose cameras are shown [what was reconstructed]");
+  verb->add_option("--rig", a.options.rig, "rig.json that stands before a session's own calibration");
+  verb->callback([arguments, verb] { or_fail(view(*arguments, *verb)); });
 }
 
 }  // namespace emberlock::cli

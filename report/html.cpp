@@ -167,19 +167,23 @@ std::string png_file(const Image& image) {
   return {png.begin(), png.end()};
 }
 
-std::string data_uri(std::string_view type, std::string_view content) {
+std::string base64(std::string_view content) {
   static constexpr std::string_view kDigits =
       "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
-  std::string base64;
-  base64.reserve(content.size() * 4 / 3 + 4);
+  std::string text;
+  text.reserve(content.size() * 4 / 3 + 4);
   for (std::size_t i = 0; i < content.size(); i += 3) {
     const std::size_t n = std::min<std::size_t>(3, content.size() - i);
     unsigned block = 0;
     for (std::size_t k = 0; k < 3; ++k)
       block = block << 8 | (k < n ? static_cast<unsigned char>(content[i + k]) : 0U);
-    for (std::size_t k = 0; k < 4; ++k) base64 += k <= n ? kDigits[block >> (18 - 6 * k) & 63U] : '=';
+    for (std::size_t k = 0; k < 4; ++k) text += k <= n ? kDigits[block >> (18 - 6 * k) & 63U] : '=';
   }
-  return "data:" + std::string(type) + ";base64," + base64;
+  return text;
+}
+
+std::string data_uri(std::string_view type, std::string_view content) {
+  return "data:" + std::string(type) + ";base64," + base64(content);
 }
 
 std::string sentence(std::string_view clause) {

@@ -23,6 +23,8 @@ std::string png_file(const Image& image);
 std::string png_data_uri(const Image& image);
 /// A picture from a data URI with its caption, which is escaped.
 std::string figure(const std::string& source, const std::string& alt, const std::string& caption);
+/// RFC 4648, with padding.
+std::string base64(std::string_view content);
 /// A file's content as a `data:` URI; `type` such as "image/jpeg".
 std::string data_uri(std::string_view type, std::string_view content);
 

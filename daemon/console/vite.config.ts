@@ -8,7 +8,6 @@ export default defineConfig({
     target: 'es2022',
     emptyOutDir: true,
     reportCompressedSize: false,
-    chunkSizeWarningLimit: 1500,  // kB: vtk.js, read only when there is a volume to show
     modulePreload: {polyfill: false},
   },
   server: {proxy: Object.fromEntries(['/api', '/open'].map(path => [path, {target: process.env.EMBERLOCK_URL ?? 'http://127.0.0.1:8741', ws: true}]))},

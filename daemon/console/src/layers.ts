@@ -32,26 +32,6 @@ export function voxelsOf({nx, ny, nz}: Volume, bytes: Uint8Array, layer: number)
   return bytes.subarray((layer + 1) * size, (layer + 2) * size);
 }
 
-/** Voxels that aren't told (0) take what their neighbours along x, y and z tell, on average, so that colours between both are true. */
-export function spread({nx, ny, nz}: Volume, values: Uint8Array): Uint8Array {
-  const out = values.slice();
-  const steps = [[1, nx], [nx, ny], [nx * ny, nz]] as const;
-  for (let at = 0; at < values.length; ++at) {
-    if (values[at] !== 0) continue;
-    let sum = 0;
-    let told = 0;
-    for (const [step, count] of steps) {
-      const place = Math.floor(at / step) % count;
-      for (const other of [place > 0 ? values[at - step]! : 0, place + 1 < count ? values[at + step]! : 0]) {
-        sum += other;
-        if (other > 0) ++told;
-      }
-    }
-    if (told > 0) out[at] = Math.round(sum / told);
-  }
-  return out;
-}
-
 /** Upright, through the middle, as seen along y: its colours are the bar's. */
 export function paintSlice(canvas: HTMLCanvasElement, {nx, ny, nz}: Volume, values: Uint8Array): void {
   Object.assign(canvas, {width: nx, height: nz});

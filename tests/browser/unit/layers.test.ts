@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 import {expect, test} from 'vitest';
 
-import {heat, kHeat, spread, voxelsOf} from '../../../daemon/console/src/layers';
+import {heat, kHeat, voxelsOf} from '../../../daemon/console/src/layers';
 import {responseOf} from '../../../daemon/console/src/quantity_choice';
 import type {Volume} from '../../../daemon/console/src/wire';
 
@@ -18,11 +18,6 @@ test('a layer’s voxels follow those of the brightness', () => {
   const bytes = Uint8Array.from([1, 2, 3, 4, 5, 6]);
   expect([...voxelsOf(volume(2, 1, 1), bytes, 0)]).toEqual([3, 4]);
   expect([...voxelsOf(volume(2, 1, 1), bytes, 1)]).toEqual([5, 6]);
-});
-
-test('what isn’t told takes its neighbours’ mean, and only theirs', () => {
-  expect([...spread(volume(3, 1, 2), Uint8Array.from([10, 0, 30, 0, 0, 0]))]).toEqual([10, 20, 30, 10, 0, 30]);
-  expect([...spread(volume(2, 2, 1), Uint8Array.from([0, 8, 0, 0]))], 'no row goes on in the next').toEqual([8, 8, 0, 8]);
 });
 
 test('a response.json is read, and what is none is not', () => {

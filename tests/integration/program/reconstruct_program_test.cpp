@@ -65,7 +65,8 @@ TEST_F(ReconstructProgram, PrintsItsReportAsJsonAndItsPageIsFound) {
   const Shell run = shell("(" + command("--hold-out 1 --json") + " 2>/dev/null)");
   ASSERT_EQ(run.status, 0) << run.output;
   EXPECT_EQ(json::parse(run.output), report());
-  const Shell view = shell("env -u DISPLAY -u WAYLAND_DISPLAY " + kEmberlock + " view " + out_.string());
+  const Shell view =
+      shell("env -u DISPLAY -u WAYLAND_DISPLAY " + kEmberlock + " view --report " + out_.string());
   EXPECT_EQ(view.status, 0);
   EXPECT_EQ(view.output, (out_ / "report.html").string() + "\n");
   EXPECT_TRUE(fs::exists(out_ / "report.html"));

@@ -1,0 +1,121 @@
+// SPDX-License-Identifier: Apache-2.0
+// The march: a ray through each pixel's middle, in voxel edges from key point (0, 0, 0), sampled in the middle of equal steps. What is
+// empty is leapt over by bricks, and a ray ends where nearly nothing comes through any more.
+
+export const kWhole = `#version 300 es
+void main() { gl_Position = vec4(vec2(gl_VertexID == 1 ? 3 : -1, gl_VertexID == 2 ? 3 : -1), 0, 1); }`;
+
+const kHead = `#version 300 es
+precision highp float; precision highp sampler3D; precision highp usampler3D; precision highp int;
+uniform sampler3D values;
+uniform usampler3D emptiness;   // bricks to the next that isn't empty; 0 in such ones
+uniform sampler2D colours;
+uniform vec3 points;
+uniform ivec3 bricks;
+uniform vec3 eye;
+uniform mat3 axes;              // right, down, forward
+uniform vec4 lens;              // focal lengths, principal point
+uniform float rows;             // of the picture
+uniform float stride;           // voxel edges
+uniform vec4 scale;             // what the values are times
+uniform vec4 range;             // low, high, depth of the whole volume, colours' darkest
+uniform float even;             // 1: as opaque wherever it is told
+uniform vec4 levels;            // isotherms, rising; those that aren't used lie beyond all values
+out vec4 colour;
+const float kThrough = 1. / 512.;
+`;
+
+const kMarch = (begin: string, sample: string, end: string) => `${kHead}
+vec4 at(vec3 p) { return texture(values, (p + .5) / points); }
+void main() {
+  vec2 pixel = (vec2(gl_FragCoord.x, rows - gl_FragCoord.y) - lens.zw) / lens.xy;
+  vec3 way = normalize(axes * vec3(pixel, 1.));
+  way += vec3(equal(way, vec3(0))) * 1e-9;
+  vec3 toLow = -eye / way, toHigh = (points - 1. - eye) / way;
+  vec3 near = min(toLow, toHigh), far = max(toLow, toHigh);
+  float from = max(0., max(near.x, max(near.y, near.z))), to = min(far.x, min(far.y, far.z));
+  float through = 1.;
+  vec3 light = vec3(0);
+  int n = 0, count = from < to ? int(ceil((to - from) / stride)) : 0;
+  float stretch = count > 0 ? (to - from) / float(count) : 0.;
+  vec3 over = stretch * way, start = eye + (from + .5 * stretch) * way;
+  ${begin}
+  while (n < count && through > kThrough) {
+    vec3 here = start + float(n) * over;
+    ivec3 brick = clamp(ivec3(here) / CELLS, ivec3(0), bricks - 1);
+    int leap = int(texelFetch(emptiness, brick, 0).r);
+    vec3 low = vec3(brick - max(leap - 1, 0)) * float(CELLS), high = vec3(brick + max(leap, 1)) * float(CELLS);
+    vec3 ends = (mix(low, high, greaterThan(way, vec3(0))) - start) / over;
+    int last = min(count, max(n, int(floor(min(ends.x, min(ends.y, ends.z))))) + 1);
+    if (leap == 0) for (; n < last; ++n) {
+      vec3 p = start + float(n) * over;
+      ${sample}
+    }
+    n = last;
+  }
+  ${end}
+}`;
+
+/** dL = S ds and the extinction in w, as recon's march: L += T S ds phi(x), T *= exp(-x) with x = sigma ds, phi(x) = (1 - exp(-x)) / x. */
+export const kColour = (absorbs: boolean) => kMarch('', absorbs ? `
+      vec4 v = scale * at(p);
+      float depth = v.w * stretch;
+      float taken = depth < .03 ? depth * (1. - depth * (.5 - depth / 6.)) : 1. - exp(-depth);
+      light += through * stretch * (depth > 0. ? taken / depth : 1.) * v.rgb;
+      through *= 1. - taken;` : `
+      light += stretch * scale.rgb * at(p).rgb;`, `
+  colour = vec4(light * range.x / 255., through);`);
+
+/** A quantity in colours, as opaque as it is high: x holds it times y, which is 1 where it is told, so that what isn't told doesn't
+ *  mix in. Isotherms are surfaces. */
+export const kQuantity = (levels: boolean) => kMarch(levels ? 'int before = -1; float past = 0.; vec3 was = start;' : '', `
+      vec4 v = at(p);
+      float told = v.y, value = told > .02 ? v.x / told : -1e30;
+      ${levels ? `
+      int band = value < -1e29 ? -1 : int(dot(step(levels, vec4(value)), vec4(1)));
+      if (band != before) {
+        int up = band > before ? 1 : -1;
+        if (band >= 0 && before >= 0) for (int m = before; m != band; m += up) {
+          float level = levels[min(m, m + up)];
+          vec3 q = mix(was, p, (level - past) / (value - past));
+          vec4 a = at(q + vec3(1, 0, 0)), b = at(q - vec3(1, 0, 0)), c = at(q + vec3(0, 1, 0)), d = at(q - vec3(0, 1, 0)),
+               e = at(q + vec3(0, 0, 1)), f = at(q - vec3(0, 0, 1));
+          vec3 slope = vec3(a.x / max(a.y, .02) - b.x / max(b.y, .02), c.x / max(c.y, .02) - d.x / max(d.y, .02),
+                            e.x / max(e.y, .02) - f.x / max(f.y, .02));
+          float facing = abs(dot(slope, way)) / max(length(slope), 1e-9);
+          float share = clamp((level - range.x) / (range.y - range.x), 0., 1.);
+          light += through * .7 * (.35 + .65 * facing) * texture(colours, vec2(mix(range.w, 1., share), .5)).rgb;
+          through *= .3;
+        }
+        before = band;
+      }
+      past = value; was = p;` : ''}
+      float share = (value - range.x) / (range.y - range.x);
+      if (share > 0.) {
+        float opaque = 1. - exp(-range.z * told * mix(min(share, 1.), 1., even) * stretch);
+        light += through * opaque * texture(colours, vec2(mix(range.w, 1., min(share, 1.)), .5)).rgb;
+        through *= 1. - opaque;
+      }`, `
+  colour = vec4(light, through);`);
+
+/** Cameras in space: their pictures, and the lines of their pyramids. */
+export const kPlaced = `#version 300 es
+uniform vec3 eye; uniform mat3 axes; uniform vec4 lens; uniform vec2 whole;
+layout(location = 0) in vec3 place; layout(location = 1) in vec2 spot;
+out vec2 where;
+void main() {
+  where = spot;
+  vec3 way = (place - eye) * axes;    // what is seen: right, down, forward
+  vec2 pixel = lens.xy * way.xy + lens.zw * way.z;
+  gl_Position = vec4((2. * pixel / whole - way.z) * vec2(1, -1), 0., way.z);
+}`;
+export const kPicture = `#version 300 es
+precision highp float;
+uniform sampler2D picture; uniform float share;
+in vec2 where; out vec4 colour;
+void main() { colour = vec4(texture(picture, where).rgb * share, 1. - share); }`;
+export const kLines = `#version 300 es
+precision highp float;
+uniform vec4 ink;
+in vec2 where; out vec4 colour;
+void main() { colour = vec4(ink.rgb * ink.a, 1. - ink.a); }`;

@@ -6,6 +6,7 @@
 #include <limits>
 #include <utility>
 
+#include "apply/coarse_grid.h"
 #include "recon/kernels/in_scatter.h"
 #include "recon/kernels/march.h"
 #include "recon/render/cropped_source.h"
@@ -26,10 +27,6 @@ recon::ShiningGrid shining(const recon::CoarseMedium& medium) {
   return {medium.grid.nx, medium.grid.ny, medium.grid.nz, medium.shine.data()};
 }
 
-recon::Rgba at_place(const recon::ShiningGrid& grid, const Eigen::Vector3d& p) {
-  return grid.at(static_cast<float>(p[0]), static_cast<float>(p[1]), static_cast<float>(p[2]));
-}
-
 }  // namespace
 
 Flame::Flame(recon::ShownVolume shown, const Placement& world_from_flame, double brightness, int light_voxels,
@@ -38,6 +35,7 @@ Flame::Flame(recon::ShownVolume shown, const Placement& world_from_flame, double
       lighting_(shown.lighting),
       world_from_flame_(world_from_flame),
       flame_from_world_(world_from_flame.inverse()),
+      light_voxels_(light_voxels),
       medium_(recon::filled_voxels(volume_)),
       crop_(recon::crop_to_medium(medium_)) {
   for (float& e : volume_.emission) e *= static_cast<float>(brightness);
@@ -46,8 +44,7 @@ Flame::Flame(recon::ShownVolume shown, const Placement& world_from_flame, double
     effects_.scattering = lighting_.scattering;
   }
   source_ = recon::cropped_source(volume_, crop_, effects_.extinction.model);
-  if (effects_.scattering.order != recon::Scattering::Order::none && effects_.scattering.albedo > 0)
-    scattered_ = recon::find_in_scatter(volume_, medium_, effects_, {}, pool);
+  if (scatters()) scattered_ = recon::find_in_scatter(volume_, medium_, effects_, {}, pool);
   coarse_ = recon::coarse_medium(volume_, medium_, for_surfaces(volume_), light_voxels, pool);
 }
 
@@ -65,6 +62,7 @@ Flame::View Flame::seen_by(const recon::CameraModel& camera, double step, recon:
   if (!scattered_.empty())
     recon::add_in_scatter(scattered_, beside.center(), crop_.hull.grid, effects_.extinction, pool,
                           view.source);
+  if (!beam_.empty()) add_beam(beside.center(), view.source, pool);
   recon::RayListOptions options;
   options.step = static_cast<float>(step);
   view.rays = recon::clip_rays({&beside}, crop_.hull, options, pool);
@@ -98,9 +96,7 @@ void Flame::add_steps(const View& view, std::size_t pixel, RayLight& light) cons
 }
 
 Eigen::Vector3d Flame::in_coarse_edges(const Eigen::Vector3d& world) const {
-  const recon::Grid& g = coarse_.grid;
-  return (flame_from_world_ * world - Eigen::Vector3f(g.origin[0], g.origin[1], g.origin[2]).cast<double>()) /
-         static_cast<double>(g.edge);
+  return in_edges(coarse_.grid, flame_from_world_ * world);
 }
 
 std::pair<double, double> Flame::inside(const Eigen::Vector3d& from, const Eigen::Vector3d& along) const {

@@ -2,6 +2,8 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
+#include <optional>
 #include <utility>
 #include <vector>
 
@@ -10,6 +12,7 @@
 
 #include "apply/placement.h"
 #include "apply/ray_light.h"
+#include "base/result.h"
 #include "recon/calibrate/camera_model.h"
 #include "recon/compute/pool.h"
 #include "recon/hull/ray_list.h"
@@ -29,6 +32,17 @@ class Flame {
   /// `brightness` is the factor of its light.
   Flame(recon::ShownVolume shown, const Placement& world_from_flame, double brightness, int light_voxels,
         recon::Pool& pool);
+
+  /// The share of a light that comes to a place in the world, past all that isn't this flame.
+  using Shade = std::function<double(const Eigen::Vector3d& place)>;
+  /// Shows it in this light from outside (OutsideLight's), instead of that of an earlier call. Matter that
+  /// scatters its own flame's light scatters this too: once, by its phase function towards the camera; if it
+  /// scatters often, also again, evenly. A result that was lit from outside scatters it once and evenly, if
+  /// `albedo` says how much of it, and otherwise keeps the light that it was filmed in. It shades itself as
+  /// in recon/render/lit_medium.h, and `shade` holds at the key points of the coarse grid. Nothing shades the
+  /// light from all sides, which isn't scattered again. Error: a nearby light within its box.
+  Status light_by(const recon::Light& light, std::optional<double> albedo, const Shade& shade,
+                  recon::Pool& pool);
 
   /// What the march needs for one camera.
   struct View {
@@ -73,6 +87,16 @@ class Flame {
   [[nodiscard]] Eigen::AlignedBox3d bounds() const;
 
  private:
+  [[nodiscard]] bool scatters() const {
+    return lighting_.scattering.order != recon::Scattering::Order::none && lighting_.scattering.albedo > 0 &&
+           !volume_.extinction.empty();
+  }
+  /// What comes of a light to each key point of the volume, in the light's own measure; its place is the
+  /// flame's.
+  [[nodiscard]] std::vector<float> arriving(const recon::Light& light, const Shade& shade,
+                                            recon::Pool& pool) const;
+  void add_beam(const Eigen::Vector3d& camera_center, std::vector<recon::Rgba>& source,
+                recon::Pool& pool) const;
   [[nodiscard]] Eigen::Vector3d in_coarse_edges(const Eigen::Vector3d& world) const;
   /// The part of a line (coarse edges) inside of the coarse box, in multiples of `along`; empty: first >
   /// second.
@@ -82,11 +106,15 @@ class Flame {
   recon::Volume volume_;
   recon::Lighting lighting_;
   Placement world_from_flame_, flame_from_world_;
+  int light_voxels_;
   recon::Effects effects_;
   recon::Hull medium_;
   recon::CroppedHull crop_;
   std::vector<recon::Rgba> source_;
   recon::ScatterField scattered_;
+  recon::Light light_;  ///< from outside, as the flame stands to it
+  std::vector<recon::Rgba>
+      beam_;  ///< like source_: what is scattered of it with a phase function, as an even one would; or empty
   recon::CoarseMedium coarse_;
 };
 

@@ -127,6 +127,7 @@ PlacedResult flame_of(Fields& fields, const fs::path& folder) {
   const std::string mirror = fields.word("mirror", {"none", "x", "y", "z"});
   if (mirror != "none") flame.world_from_flame.rotation.col(mirror.front() - 'x') *= -1;
   flame.brightness = fields.number("brightness", 1, 0, kFar);
+  if (fields.find("albedo") != nullptr) flame.albedo = fields.number("albedo", 1, 0, 1);
   flame.shift = Seconds(fields.number("shift", 0, -kFar, kFar));
   flame.rate = Hertz(fields.number("rate", 24, 1e-3, 1e4));
   if (fields.word("frames", {"loop", "once"}) == "once") flame.frames = PlacedResult::Frames::once;
@@ -169,6 +170,21 @@ std::array<double, 3> colour(Fields& fields, const char* key) {
   return {rgb[0], rgb[1], rgb[2]};
 }
 
+/// The lamp or sun of a scene.
+void read_light(Fields& fields, recon::Light& light) {
+  const bool nearby = fields.find("at") != nullptr;
+  if (nearby && fields.find("towards") != nullptr)
+    refuse("has both at and towards", "light", "Give one of them");
+  light.source = nearby ? recon::Light::Source::nearby : recon::Light::Source::distant;
+  const Eigen::Vector3d place = fields.place(nearby ? "at" : "towards");
+  if (!nearby && !(place.norm() > 0)) refuse("is no direction", "light.towards");
+  light.place = {place[0], place[1], place[2]};
+  fields.need("level");
+  light.strength = colour(fields, "level");
+  for (double& level : light.strength)
+    level /= 4;  // scattered evenly, over a white surface's: 1 / (4 pi) to 1 / pi
+}
+
 SceneFile scene_of(const Json& json, const fs::path& folder) {
   Fields fields(json, "");
   if (fields.need("format") != "emberlock scene")
@@ -187,7 +203,12 @@ SceneFile scene_of(const Json& json, const fs::path& folder) {
     scene.camera = camera_of(of_camera);
     of_camera.finish();
   }
-  scene.ambient = colour(fields, "ambient");
+  if (const Json* const light = fields.find("light")) {
+    Fields of_light(*light, "light");
+    read_light(of_light, scene.light);
+    of_light.finish();
+  }
+  scene.light.ambient = colour(fields, "ambient");
   scene.background = colour(fields, "background");
   fields.finish();
   return scene;
@@ -203,8 +224,11 @@ Result<SceneFile> scene_in_gltf(const fs::path& file) {
                     "file that names both",
                     kMostFlames)};
   SceneFile scene;
-  for (const GltfScene::Flame& flame : found.flames)
-    scene.flames.push_back({file.parent_path() / flame.result, flame.world_from_flame});
+  for (const GltfScene::Flame& flame : found.flames) {
+    PlacedResult& placed = scene.flames.emplace_back();
+    placed.result = file.parent_path() / flame.result;
+    placed.world_from_flame = flame.world_from_flame;
+  }
   scene.geometry.push_back({file, {}});
   if (found.cameras.empty()) return scene;
   const GltfScene::Camera& camera = found.cameras.front();

@@ -47,6 +47,7 @@ class PixelTracer {
         around_(around),
         camera_(camera),
         options_(options),
+        outside_(around.light, flames, around.surfaces),
         lights_(flames, around.surfaces) {
     views_.reserve(flames.size());
     for (const Flame* flame : flames) views_.push_back(flame->seen_by(camera, options.step, pool));
@@ -113,8 +114,8 @@ class PixelTracer {
 
   [[nodiscard]] Eigen::Vector3d shine(const Eigen::Vector3d& place, const Surfaces::Hit& hit,
                                       const SurfaceLight::Draw& draw, SurfaceLight::Scratch& scratch) const {
-    const Eigen::Vector3d falls =
-        lights_.sample(place, hit.normal, draw, scratch) / std::numbers::pi + vector_of(around_.ambient);
+    const Eigen::Vector3d falls = lights_.sample(place, hit.normal, draw, scratch) / std::numbers::pi +
+                                  outside_.on_white(place, hit.normal);
     return vector_of(hit.material->emitted) + vector_of(hit.material->albedo).cwiseProduct(falls);
   }
 
@@ -122,6 +123,7 @@ class PixelTracer {
   const Surroundings& around_;
   const recon::CameraModel& camera_;
   const PictureOptions& options_;
+  OutsideLight outside_;
   SurfaceLight lights_;
   std::vector<Flame::View> views_;
 };

@@ -15,9 +15,6 @@ constexpr int kProposals = 8;
 constexpr int kFirstOfProposals = 2;  // of a draw's numbers; those before are the ray's
 static_assert(kFirstOfProposals + 5 * kProposals <= SurfaceLight::Draw::kEach);
 
-/// So far from a surface its own rounding ends, metres.
-double clear_of_surface(const Eigen::Vector3d& place) { return 1e-5 * (1 + place.cwiseAbs().maxCoeff()); }
-
 }  // namespace
 
 SurfaceLight::SurfaceLight(const std::vector<const Flame*>& flames, const Surfaces& surfaces)

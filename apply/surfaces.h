@@ -11,6 +11,11 @@
 
 namespace emberlock::apply {
 
+/// So far from a surface its own rounding ends, metres.
+inline double clear_of_surface(const Eigen::Vector3d& place) {
+  return 1e-5 * (1 + place.cwiseAbs().maxCoeff());
+}
+
 /// A mesh that rays are cast through (Embree 3). Functions may be called by several threads.
 class Surfaces {
  public:

@@ -107,7 +107,9 @@ TEST_F(ScenePictureTest, AColouredSurfaceReflectsItsShareAndShinesByItself) {
   const Surfaces floor = built(std::move(mesh));
   const Flame none = flame(spark(0));
   PictureOptions options;
-  const ScenePicture seen = scene_picture({&none}, {floor, {8, 8, 8}, {77, 0, 0}},
+  recon::Light even;
+  even.ambient = {8, 8, 8};
+  const ScenePicture seen = scene_picture({&none}, {floor, even, {77, 0, 0}},
                                           camera_at({1, 0, 1}, {0, 0, 0}, kSmall, 40), options, pool_);
   EXPECT_NEAR(seen.light.rgb[0], 1 + 0.5 * 8, 1e-4);
   EXPECT_NEAR(seen.light.rgb[1], 2 + 0.25 * 8, 1e-4);

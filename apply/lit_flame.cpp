@@ -14,7 +14,9 @@ namespace {
 
 using Source = recon::Light::Source;
 
-Eigen::Vector3d place_in(const recon::Light& light) { return {light.place[0], light.place[1], light.place[2]}; }
+Eigen::Vector3d place_in(const recon::Light& light) {
+  return {light.place[0], light.place[1], light.place[2]};
+}
 
 /// The light as the volume stands to it. One nearby shines by distances in the volume's metres.
 recon::Light as_seen_by(const Placement& flame_from_world, recon::Light light) {
@@ -34,8 +36,8 @@ Eigen::Vector3d key_point_of(const recon::Grid& g, int i, int j, int k) {
 }
 
 /// What a medium's extinction scatters of a light whose share `reach` comes to each key point.
-std::vector<float> scattered_of(const recon::Volume& volume, double albedo, const std::array<double, 3>& level,
-                                const std::vector<float>* reach) {
+std::vector<float> scattered_of(const recon::Volume& volume, double albedo,
+                                const std::array<double, 3>& level, const std::vector<float>* reach) {
   std::vector<float> source(3 * volume.extinction.size());
   for (std::size_t p = 0; p < volume.extinction.size(); ++p) {
     const double share = albedo * static_cast<double>(volume.extinction[p]) *
@@ -77,13 +79,17 @@ std::vector<float> Flame::arriving(const recon::Light& light, const Shade& shade
   return reach;
 }
 
-Status Flame::light_by(const recon::Light& light, std::optional<double> albedo, const Shade& shade, recon::Pool& pool) {
+Status Flame::light_by(const recon::Light& light, std::optional<double> albedo, const Shade& shade,
+                       recon::Pool& pool) {
   const bool was_lit = lighting_.light.source != Source::none;
-  if (volume_.extinction.empty() || medium_.count == 0 || !(was_lit ? albedo.has_value() : scatters())) return {};
+  if (volume_.extinction.empty() || medium_.count == 0 || !(was_lit ? albedo.has_value() : scatters()))
+    return {};
   light_ = as_seen_by(flame_from_world_, light);
   const recon::Box box = recon::box_of(volume_.grid);
-  if (light.source == Source::nearby && ((place_in(light_) - box.center).array().abs() <= 0.5 * box.size.array()).all())
-    return Error{ErrorKind::bad_input, "the nearby light stands inside of the box around a flame that scatters it", "light",
+  if (light.source == Source::nearby &&
+      ((place_in(light_) - box.center).array().abs() <= 0.5 * box.size.array()).all())
+    return Error{ErrorKind::bad_input,
+                 "the nearby light stands inside of the box around a flame that scatters it", "light",
                  "Give a place outside of it"};
   const double share = was_lit ? *albedo : lighting_.scattering.albedo;
   const std::vector<float> reach = arriving(light_, shade, pool);
@@ -107,7 +113,8 @@ Status Flame::light_by(const recon::Light& light, std::optional<double> albedo, 
   return {};
 }
 
-void Flame::add_beam(const Eigen::Vector3d& camera_center, std::vector<recon::Rgba>& source, recon::Pool& pool) const {
+void Flame::add_beam(const Eigen::Vector3d& camera_center, std::vector<recon::Rgba>& source,
+                     recon::Pool& pool) const {
   const recon::Grid& g = crop_.hull.grid;
   const recon::HenyeyGreenstein<double> phase{lighting_.scattering.asymmetry};
   const bool nearby = light_.source == Source::nearby;

@@ -11,9 +11,10 @@
 
 namespace emberlock::apply {
 
-/// A scene's light that isn't of its flames: recon::Light (`none`, `distant` or `nearby`, in the world) as matter of
-/// albedo 1 scatters it, so its strength is a quarter of the radiance of a white surface that faces it, from a metre if
-/// it is nearby. What comes from it to a place is hidden by surfaces and dimmed by smoke; `ambient` comes everywhere.
+/// A scene's light that isn't of its flames: recon::Light (`none`, `distant` or `nearby`, in the world) as
+/// matter of albedo 1 scatters it, so its strength is a quarter of the radiance of a white surface that faces
+/// it, from a metre if it is nearby. What comes from it to a place is hidden by surfaces and dimmed by smoke;
+/// `ambient` comes everywhere.
 class OutsideLight {
  public:
   /// All must outlive it.

@@ -15,9 +15,6 @@ namespace emberlock::apply {
 namespace {
 
 Eigen::Vector3d vector_of(const std::array<double, 3>& v) { return {v[0], v[1], v[2]}; }
-Eigen::Vector3d vector_of(const std::array<float, 3>& v) {
-  return Eigen::Vector3f(v[0], v[1], v[2]).cast<double>();
-}
 Eigen::Vector3d colour_of(const recon::Rgba& v) {
   return Eigen::Vector3f(v.c[0], v.c[1], v.c[2]).cast<double>();
 }
@@ -116,7 +113,7 @@ class PixelTracer {
                                       const SurfaceLight::Draw& draw, SurfaceLight::Scratch& scratch) const {
     const Eigen::Vector3d falls = lights_.sample(place, hit.normal, draw, scratch) / std::numbers::pi +
                                   outside_.on_white(place, hit.normal);
-    return vector_of(hit.material->emitted) + vector_of(hit.material->albedo).cwiseProduct(falls);
+    return hit.emitted + hit.albedo.cwiseProduct(falls);
   }
 
   const std::vector<const Flame*>& flames_;

@@ -27,7 +27,7 @@ namespace emberlock::apply {
 //
 // Not simulated: light from surface to surface, light that surfaces emit onto others, a flame's in-scatter
 // onto surfaces (it is shown to cameras), light of one flame scattered by another's smoke, shade in the light
-// from all sides, mirrors, glass, textures, rays bent by hot gas, the shutter's time.
+// from all sides, mirrors, glass, rays bent by hot gas, the shutter's time.
 
 /// What stands around flames.
 struct Surroundings {

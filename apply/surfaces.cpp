@@ -24,12 +24,61 @@ RTCRay ray_from(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction,
   return ray;
 }
 
+Eigen::Vector3d vector_from(const std::array<float, 3>& v) {
+  return {static_cast<double>(v[0]), static_cast<double>(v[1]), static_cast<double>(v[2])};
+}
+
+/// A place in a triangle, by its barycentric coordinates.
+class Within {
+ public:
+  Within(const Mesh& mesh, std::uint32_t triangle, float u, float v)
+      : mesh_(mesh),
+        material_(mesh.materials[mesh.material[triangle]]),
+        corners_(mesh.triangles[triangle]),
+        weight_{1 - u - v, u, v} {}
+
+  /// On the side of that of the triangle.
+  [[nodiscard]] Eigen::Vector3d normal(const Eigen::Vector3d& flat) const {
+    if (mesh_.normals.empty()) return flat;
+    const Eigen::Vector3d smooth = vector_from(between(mesh_.normals));
+    const double length = smooth.norm();
+    if (!(length > 0)) return flat;
+    return smooth / (smooth.dot(flat) < 0 ? -length : length);
+  }
+  [[nodiscard]] Eigen::Vector3d albedo() const {
+    const Eigen::Vector3d factor = vector_from(material_.albedo);
+    if (material_.texture < 0) return factor;
+    const std::array<float, 2> at = between(mesh_.texture_places);
+    const Texture& texture = mesh_.textures[static_cast<std::size_t>(material_.texture)];
+    return factor.cwiseProduct(vector_from(texture.at(at[0], at[1])));
+  }
+  [[nodiscard]] Eigen::Vector3d emitted() const { return vector_from(material_.emitted); }
+
+ private:
+  template <std::size_t kLanes>
+  [[nodiscard]] std::array<float, kLanes> between(
+      const std::vector<std::array<float, kLanes>>& values) const {
+    std::array<float, kLanes> sum{};
+    for (std::size_t c = 0; c < 3; ++c)
+      for (std::size_t lane = 0; lane < kLanes; ++lane) sum[lane] += weight_[c] * values[corners_[c]][lane];
+    return sum;
+  }
+
+  const Mesh& mesh_;
+  const Material& material_;
+  const std::array<std::uint32_t, 3>& corners_;
+  std::array<float, 3> weight_;
+};
+
 }  // namespace
 
 struct Surfaces::Embree {
   explicit Embree(Mesh m) : mesh(std::move(m)) {
     // Embree reads whole vectors: 16 bytes from the last vertex on must be there.
     mesh.vertices.push_back({0, 0, 0});
+    if (!mesh.normals.empty()) mesh.normals.resize(mesh.vertices.size());
+    if (!mesh.texture_places.empty() || !mesh.textures.empty())
+      mesh.texture_places.resize(mesh.vertices.size());
   }
   Embree(Embree&&) = delete;
   Embree& operator=(Embree&&) = delete;
@@ -85,12 +134,11 @@ std::optional<Surfaces::Hit> Surfaces::first(const Eigen::Vector3d& origin, cons
   query.hit.geomID = query.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
   rtcIntersect1(embree_->scene, &context, &query);
   if (query.hit.geomID == RTC_INVALID_GEOMETRY_ID) return std::nullopt;
-  const Eigen::Vector3d normal =
+  Eigen::Vector3d normal =
       Eigen::Vector3f(query.hit.Ng_x, query.hit.Ng_y, query.hit.Ng_z).cast<double>().normalized();
-  const Mesh& mesh = embree_->mesh;
-  return Hit{static_cast<double>(query.ray.tfar),
-             normal.dot(direction) > 0 ? Eigen::Vector3d(-normal) : normal,
-             &mesh.materials[mesh.material[query.hit.primID]]};
+  if (normal.dot(direction) > 0) normal = -normal;
+  const Within within(embree_->mesh, query.hit.primID, query.hit.u, query.hit.v);
+  return Hit{static_cast<double>(query.ray.tfar), within.normal(normal), within.albedo(), within.emitted()};
 }
 
 bool Surfaces::blocked(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction, double from,

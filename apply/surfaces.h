@@ -21,8 +21,10 @@ class Surfaces {
  public:
   struct Hit {
     double distance;         ///< along the ray, metres
-    Eigen::Vector3d normal;  ///< of the triangle, unit length, towards where the ray came from
-    const Material* material;
+    Eigen::Vector3d normal;  ///< of the triangle, or between its vertices', unit length, on the side from
+                             ///< which the ray came
+    Eigen::Vector3d albedo;
+    Eigen::Vector3d emitted;  ///< grey levels
   };
 
   /// Error (device): Embree can't be started, or memory is short.

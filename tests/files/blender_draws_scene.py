@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-# Draws the scene of `bench_scene` with Blender's Cycles, by direct light alone, and says how far `emberlock scene` is from it:
+# Draws the scene of `bench_scene` with Blender's Cycles, by direct light alone, and says how far `emberlock scene` is from it; fails where
+# that is more than `most` (0.01) of the range, RMS, or where `wrong`, a picture of another scene, isn't:
 #   blender -b --factory-startup --python-exit-code 1 -P blender_draws_scene.py -- \
 #     '{"scene": "/ABS/scene.json", "volumes": ["/ABS/flame.vdb", ...], "picture": "/ABS/out.exr", "image": [320, 180], "samples": 256,
-#       "expected": "/ABS/frame-0000.exr"}'
+#       "expected": "/ABS/frame-0000.exr", "most": 0.01, "wrong": "/ABS/other.exr"}'
 # `volumes`: the scene's flames in their order, by `emberlock export --format blender4`.
 import json
 import os
@@ -136,9 +137,18 @@ set_up_render(scene)
 bpy.ops.render.render(write_still=True)
 seen, expected = pixels(ask["picture"]), pixels(ask["expected"])
 off = expected - seen
-tell("all pixels, of the range", off, seen.max() - seen.min())
+full = seen.max() - seen.min()
+tell("all pixels, of the range", off, full)
 if "flames" in ask:  # the flames alone, without surfaces: where they aren't, surfaces are seen
     bare = pixels(ask["flames"]).max(axis=2) <= 0
     tell("surfaces alone, of their range", off[bare], seen[bare].max() - seen[bare].min())
     tell("flames, of their range", off[~bare], seen[~bare].max() - seen[~bare].min())
     print(f"LIGHT on surfaces {100 * (expected[bare].sum() / seen[bare].sum() - 1):+.3f} %")
+most = ask.get("most", 0.01)
+if np.sqrt(np.mean(off**2)) > most * full:
+    raise RuntimeError(f"emberlock scene differs by more than {100 * most} % of the range")
+if "wrong" in ask:
+    other = pixels(ask["wrong"]) - seen
+    tell("another scene", other, full)
+    if np.sqrt(np.mean(other**2)) <= most * full:
+        raise RuntimeError("another scene would have passed")

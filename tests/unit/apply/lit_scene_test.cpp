@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Scenes in light from outside.
+#include "tests/support/lit_scene.h"
+
 #include <cmath>
 #include <limits>
 #include <numbers>
@@ -11,7 +13,6 @@
 #include "recon/kernels/phase_function.h"
 #include "recon/render/render.h"
 #include "tests/support/camera_at.h"
-#include "tests/support/lit_scene.h"
 #include "tests/support/small_scene.h"
 
 namespace emberlock::apply {
@@ -48,8 +49,9 @@ class LitSceneTest : public testing::Test {
                        const recon::CameraModel& camera) {
     return scene_picture(flames, {around, light}, camera, {}, pool_);
   }
-  void expect_lit(Flame& flame, const Light& light, std::optional<double> albedo = {},
-                  const Flame::Shade& shade = [](const Eigen::Vector3d&) { return 1.0; }) {
+  void expect_lit(
+      Flame& flame, const Light& light, std::optional<double> albedo = {},
+      const Flame::Shade& shade = [](const Eigen::Vector3d&) { return 1.0; }) {
     const Status lit = flame.light_by(light, albedo, shade, pool_);
     ASSERT_TRUE(lit.ok()) << lit.error().message();
   }
@@ -74,7 +76,8 @@ Eigen::Vector3d floor_at(const recon::CameraModel& camera, int x, int y) {
   return ray.origin - ray.origin.z() / ray.direction.z() * ray.direction;
 }
 
-/// A white floor: the sun's level times the cosine; a lamp's over the squared distance as well; and the even light.
+/// A white floor: the sun's level times the cosine; a lamp's over the squared distance as well; and the even
+/// light.
 TEST_F(LitSceneTest, AFloorHasTheLightsLevel) {
   const Surfaces around = surfaces(floor());
   const recon::CameraModel camera = camera_at({1, 0.2, 1}, {0, 0, 0}, kImage, 30);
@@ -101,7 +104,8 @@ TEST_F(LitSceneTest, PlatesAndSmokeShadeTheFloor) {
   EXPECT_NEAR(red(picture({&slab}, open, slanted, below)), 0.8 * 100 * std::exp(-4 * 0.25 / 0.8), 0.1);
 }
 
-/// The volume of a lit medium, stripped of its light and lit again by the scene: what render_view() shows of it.
+/// The volume of a lit medium, stripped of its light and lit again by the scene: what render_view() shows of
+/// it.
 TEST_F(LitSceneTest, LitSmokeInItsOwnLightIsAsItWasFilmed) {
   Light own = test::distant_light({0.4, -0.3, 1});
   for (const auto source : {Light::Source::distant, Light::Source::nearby, Light::Source::none}) {
@@ -134,7 +138,8 @@ TEST_F(LitSceneTest, LitSmokeInItsOwnLightIsAsItWasFilmed) {
                                            camera.camera_from_world.rotation * place.translation;
     Flame flame({dark, {{}, filmed}}, place, 1, 32, pool_);
     const Surfaces nothing = surfaces({});
-    EXPECT_EQ(red(picture({&flame}, nothing, {}, camera)), 0) << "the light that it was filmed in is its emission's";
+    EXPECT_EQ(red(picture({&flame}, nothing, {}, camera)), 0)
+        << "the light that it was filmed in is its emission's";
     expect_lit(flame, lit_by, 0.5);
     const recon::RadianceImage expected =
         recon::render_view(truth.volume, recon::filled_voxels(truth.volume), effects, beside);
@@ -161,16 +166,19 @@ TEST_F(LitSceneTest, ScatteringFollowsThePhaseFunctionTowardsTheCamera) {
   constexpr double kSigma = 1e-3;
   constexpr double kAsymmetry = 0.6;
   const Surfaces nothing = surfaces({});
-  Flame thin = smoke({-0.2, -0.2, -0.2}, 9, 9, 9, 0.05, kSigma, {recon::Scattering::Order::single, 0.8, kAsymmetry});
+  Flame thin =
+      smoke({-0.2, -0.2, -0.2}, 9, 9, 9, 0.05, kSigma, {recon::Scattering::Order::single, 0.8, kAsymmetry});
   for (const Eigen::Vector3d& towards : {Eigen::Vector3d(1, 0, 0), {-1, 0, 0}, {0, 1, 0}}) {
     Light sun = shining(Light::Source::distant, towards, 1000);
     sun.ambient = {40, 0, 0};
     expect_lit(thin, sun);
     const recon::CameraModel camera = camera_at({20, 0, 0}, {0, 0, 0}, kImage, 400);
     const double mu = -towards.x();
-    const double expected = 0.8 * kSigma * 0.4 *
-                            (4 * std::numbers::pi * 250 * recon::HenyeyGreenstein<double>{kAsymmetry}(mu) + 40);
-    EXPECT_NEAR(static_cast<double>(red(picture({&thin}, nothing, sun, camera))), expected, 0.003 * expected) << mu;
+    const double expected =
+        0.8 * kSigma * 0.4 *
+        (4 * std::numbers::pi * 250 * recon::HenyeyGreenstein<double>{kAsymmetry}(mu) + 40);
+    EXPECT_NEAR(static_cast<double>(red(picture({&thin}, nothing, sun, camera))), expected, 0.003 * expected)
+        << mu;
   }
 }
 
@@ -181,8 +189,9 @@ TEST_F(LitSceneTest, LightScatteredAgainComesOutOfTheDarkSide) {
   const recon::CameraModel camera = camera_at({2, 0, 0}, {0, 0, 0}, kImage, 40);
   float seen[2] = {};
   for (const bool again : {false, true}) {
-    Flame cloud = smoke({-0.2, -0.2, -0.2}, 17, 17, 17, 0.025, 20,
-                        {again ? recon::Scattering::Order::multiple : recon::Scattering::Order::single, 0.99, 0});
+    Flame cloud =
+        smoke({-0.2, -0.2, -0.2}, 17, 17, 17, 0.025, 20,
+              {again ? recon::Scattering::Order::multiple : recon::Scattering::Order::single, 0.99, 0});
     expect_lit(cloud, sun);
     seen[again ? 1 : 0] = red(picture({&cloud}, nothing, sun, camera));
     EXPECT_LT(seen[again ? 1 : 0], 1000);
@@ -207,10 +216,12 @@ TEST_F(LitSceneTest, SurfacesAndOtherSmokeShadeSmoke) {
   const float open = lit({&thin}, nothing);
   EXPECT_GT(open, 0.5);
   EXPECT_EQ(lit({&thin}, covered), 0);
-  EXPECT_NEAR(lit({&thin, &above}, nothing), static_cast<double>(open) * std::exp(-1), 0.003 * static_cast<double>(open));
+  EXPECT_NEAR(lit({&thin, &above}, nothing), static_cast<double>(open) * std::exp(-1),
+              0.003 * static_cast<double>(open));
 }
 
-/// A thin puff over a black floor on which the sun doesn't fall: its power is albedo sigma V E, evenly to all sides.
+/// A thin puff over a black floor on which the sun doesn't fall: its power is albedo sigma V E, evenly to all
+/// sides.
 TEST_F(LitSceneTest, WhatSmokeScattersFallsOnSurfaces) {
   const Surfaces around = surfaces(floor());
   constexpr double kSigma = 0.01;
@@ -228,8 +239,8 @@ TEST_F(LitSceneTest, WhatSmokeScattersFallsOnSurfaces) {
 
 TEST_F(LitSceneTest, ALampWithinSmokeIsRefused) {
   Flame cloud = smoke({-0.2, -0.2, -0.2}, 9, 9, 9, 0.05, 2, {recon::Scattering::Order::single, 1, 0});
-  const Status lit = cloud.light_by(shining(Light::Source::nearby, {0.1, 0, 0}, 10), {},
-                                    [](const Eigen::Vector3d&) { return 1.0; }, pool_);
+  const Status lit = cloud.light_by(
+      shining(Light::Source::nearby, {0.1, 0, 0}, 10), {}, [](const Eigen::Vector3d&) { return 1.0; }, pool_);
   ASSERT_FALSE(lit.ok());
   EXPECT_THAT(lit.error().message(), testing::HasSubstr("inside of the box"));
 }

@@ -25,7 +25,8 @@ const T& entry(const std::vector<T>& all, int index, const std::string& what) {
 /// Its factors; the texture is left to texture_of().
 Material material_of(const tinygltf::Material& from, const std::string& where);
 
-/// The picture of a texture, whose file's bytes the loader kept. `texels`: how many others took, to which it adds.
+/// The picture of a texture, whose file's bytes the loader kept. `texels`: how many others took, to which it
+/// adds.
 Texture texture_of(const tinygltf::Model& model, int index, std::size_t& texels);
 
 }  // namespace emberlock::apply

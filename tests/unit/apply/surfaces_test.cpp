@@ -62,7 +62,8 @@ TEST(Surfaces, NormalsAreBetweenThoseOfTheCorners) {
   test::add_square(mesh, 0, 0, 0, 1);
   EXPECT_TRUE(hit_from_above(mesh, 0, 0).normal.isApprox(Eigen::Vector3d::UnitZ()));
   const float half = std::sqrt(0.5F);
-  mesh.normals = {{-half, 0, -half}, {half, 0, -half}, {half, 0, -half}, {-half, 0, -half}};  // told for its lower side
+  mesh.normals = {
+      {-half, 0, -half}, {half, 0, -half}, {half, 0, -half}, {-half, 0, -half}};  // told for its lower side
   EXPECT_TRUE(hit_from_above(mesh, 0, 0.1).normal.isApprox(Eigen::Vector3d::UnitZ(), 1e-5));
   const Eigen::Vector3d aside = hit_from_above(mesh, 0.5, 0.1).normal;
   EXPECT_NEAR(aside.x() / aside.z(), -0.5, 1e-5);

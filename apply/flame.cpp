@@ -3,12 +3,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <utility>
 
-#include "apply/coarse_grid.h"
 #include "recon/kernels/in_scatter.h"
-#include "recon/kernels/march.h"
 #include "recon/render/cropped_source.h"
 #include "recon/render/scattered_source.h"
 
@@ -23,8 +20,13 @@ recon::Extinction for_surfaces(const recon::Volume& volume) {
   return extinction;
 }
 
-recon::ShiningGrid shining(const recon::CoarseMedium& medium) {
-  return {medium.grid.nx, medium.grid.ny, medium.grid.nz, medium.shine.data()};
+Affine affine(const Eigen::Matrix3d& linear, const Eigen::Vector3d& offset) {
+  Affine to;
+  for (int r = 0; r < 3; ++r) {
+    for (int c = 0; c < 3; ++c) to.m[4 * r + c] = static_cast<float>(linear(r, c));
+    to.m[4 * r + 3] = static_cast<float>(offset[r]);
+  }
+  return to;
 }
 
 }  // namespace
@@ -43,9 +45,11 @@ Flame::Flame(recon::ShownVolume shown, const Placement& world_from_flame, double
     effects_.extinction.model = recon::Extinction::Model::field;
     effects_.scattering = lighting_.scattering;
   }
-  source_ = recon::cropped_source(volume_, crop_, effects_.extinction.model);
+  source_ = std::make_shared<const std::vector<recon::Rgba>>(
+      recon::cropped_source(volume_, crop_, effects_.extinction.model));
   if (scatters()) scattered_ = recon::find_in_scatter(volume_, medium_, effects_, {}, pool);
   coarse_ = recon::coarse_medium(volume_, medium_, for_surfaces(volume_), light_voxels, pool);
+  emitters_ = glowing();
 }
 
 Flame::View Flame::seen_by(const recon::CameraModel& camera, double step, recon::Pool& pool) const {
@@ -56,118 +60,55 @@ Flame::View Flame::seen_by(const recon::CameraModel& camera, double step, recon:
                               from_world * world_from_flame_.translation / world_from_flame_.scale};
   View view;
   view.source = source_;
+  const bool here = pool.device() != recon::Device::cuda;
   const ImageSize size = camera.intrinsics.size;
-  view.ray_of_pixel.assign(static_cast<std::size_t>(size.width) * static_cast<std::size_t>(size.height), -1);
+  if (here)
+    view.ray_of_pixel.assign(static_cast<std::size_t>(size.width) * static_cast<std::size_t>(size.height),
+                             -1);
   if (medium_.count == 0) return view;
-  if (!scattered_.empty())
-    recon::add_in_scatter(scattered_, beside.center(), crop_.hull.grid, effects_.extinction, pool,
-                          view.source);
-  if (!beam_.empty()) add_beam(beside.center(), view.source, pool);
+  if (!scattered_.empty() || !beam_.empty()) {
+    std::vector<recon::Rgba> source = *source_;
+    if (!scattered_.empty())
+      recon::add_in_scatter(scattered_, beside.center(), crop_.hull.grid, effects_.extinction, pool, source);
+    if (!beam_.empty()) add_beam(beside.center(), source, pool);
+    view.source = std::make_shared<const std::vector<recon::Rgba>>(std::move(source));
+  }
   recon::RayListOptions options;
   options.step = static_cast<float>(step);
+  if (!here) options.home = recon::RayListOptions::Home::where_it_is_made;
   view.rays = recon::clip_rays({&beside}, crop_.hull, options, pool);
-  for (std::size_t r = 0; r < view.rays.pixels.size(); ++r)
+  for (std::size_t r = 0; here && r < view.rays.pixels.size(); ++r)
     view.ray_of_pixel[view.rays.pixels[r]] = static_cast<std::int32_t>(r);
   return view;
 }
 
-void Flame::add_steps(const View& view, std::size_t pixel, RayLight& light) const {
-  const std::int32_t ray = view.ray_of_pixel[pixel];
-  if (ray < 0) return;
-  const recon::RayTable table = view.rays.table();
-  const recon::MarchRay& r = table.rays[ray];
-  const float meters = crop_.hull.grid.edge * static_cast<float>(world_from_flame_.scale);
-  const float per_meter = 1 / meters;
-  const auto row = static_cast<std::size_t>(table.nx);
-  const std::size_t plane = row * static_cast<std::size_t>(table.ny);
-  std::vector<RayLight::Step>& steps = light.steps();
-  for (std::size_t n = r.first_run; n < r.first_run + r.runs; ++n) {
-    const recon::Run& run = table.runs[n];
-    float reached = run.start * meters;
-    auto put = [&](int sample, std::int32_t base, float fx, float fy, float fz) {
-      const float to = (run.start + static_cast<float>(sample + 1) * run.step) * meters;
-      steps.push_back(
-          {reached, to, per_meter * recon::trilinear(view.source.data() + base, row, plane, fx, fy, fz)});
-      reached = to;
-    };
-    recon::each_sample<float>(table, recon::StraightPath::line<float>(table, n), run, put);
-  }
-  light.end_flame();
+FlameTable Flame::table() const {
+  FlameTable table;
+  const recon::Grid& g = coarse_.grid;
+  table.there = medium_.count > 0;
+  table.absorbs = !volume_.extinction.empty();
+  table.edge_meters = crop_.hull.grid.edge * static_cast<float>(world_from_flame_.scale);
+  table.coarse = {g.nx, g.ny, g.nz, coarse_.shine.data()};
+  table.coarse_meters = g.edge * static_cast<float>(world_from_flame_.scale);
+  const Eigen::Vector3d origin(static_cast<double>(g.origin[0]), static_cast<double>(g.origin[1]),
+                               static_cast<double>(g.origin[2]));
+  const auto edge = static_cast<double>(g.edge);
+  table.world_from_coarse =
+      affine(edge * world_from_flame_.scale * world_from_flame_.rotation, world_from_flame_ * origin);
+  table.coarse_from_world = affine(flame_from_world_.scale / edge * flame_from_world_.rotation,
+                                   (flame_from_world_.translation - origin) / edge);
+  return table;
 }
 
-Eigen::Vector3d Flame::in_coarse_edges(const Eigen::Vector3d& world) const {
-  return in_edges(coarse_.grid, flame_from_world_ * world);
+FlameTable Flame::table(const View& view) const {
+  FlameTable table = this->table();
+  table.rays = view.rays.table();
+  table.source = view.source->data();
+  table.ray_of_pixel = view.ray_of_pixel.data();
+  return table;
 }
 
-std::pair<double, double> Flame::inside(const Eigen::Vector3d& from, const Eigen::Vector3d& along) const {
-  const double last[3] = {coarse_.grid.nx - 1.0, coarse_.grid.ny - 1.0, coarse_.grid.nz - 1.0};
-  double enters = -std::numeric_limits<double>::infinity();
-  double leaves = std::numeric_limits<double>::infinity();
-  for (int a = 0; a < 3; ++a) {
-    if (along[a] == 0) {
-      if (from[a] < 0 || from[a] > last[a]) return {1, 0};
-      continue;
-    }
-    const double low = -from[a] / along[a];
-    const double high = (last[a] - from[a]) / along[a];
-    enters = std::max(enters, std::min(low, high));
-    leaves = std::min(leaves, std::max(low, high));
-  }
-  return {enters, leaves};
-}
-
-double Flame::close_by(const Eigen::Vector3d& place) const {
-  if (medium_.count == 0) return 0;
-  const Eigen::Vector3d p = in_coarse_edges(place);
-  const Eigen::Vector3d last(coarse_.grid.nx - 1, coarse_.grid.ny - 1, coarse_.grid.nz - 1);
-  constexpr double kMargin = 2;
-  if ((p.array() < -kMargin).any() || (p.array() > last.array() + kMargin).any()) return 0;
-  return static_cast<double>(coarse_.grid.edge) * world_from_flame_.scale;
-}
-
-double Flame::depth_between(const Eigen::Vector3d& a, const Eigen::Vector3d& b) const {
-  if (volume_.extinction.empty() || medium_.count == 0) return 0;
-  const Eigen::Vector3d from = in_coarse_edges(a);
-  const Eigen::Vector3d along = in_coarse_edges(b) - from;
-  const std::pair<double, double> part = inside(from, along);
-  const double enters = std::max(part.first, 0.0);
-  const double leaves = std::min(part.second, 1.0);
-  if (!(leaves > enters)) return 0;
-  const double length = (leaves - enters) * along.norm();
-  const int steps = std::max(1, static_cast<int>(std::ceil(length)));
-  const recon::ShiningGrid grid = shining(coarse_);
-  double sum = 0;
-  for (int i = 0; i < steps; ++i) {
-    const double t = enters + (i + 0.5) / steps * (leaves - enters);
-    sum += static_cast<double>(at_place(grid, from + t * along).c[3]);
-  }
-  return sum * length / steps;
-}
-
-void Flame::add_coarse_steps(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction, double a,
-                             RayLight& light) const {
-  if (medium_.count == 0) return;
-  const Eigen::Vector3d from = in_coarse_edges(origin);
-  const Eigen::Vector3d along = in_coarse_edges(origin + direction) - from;  // of one metre
-  const std::pair<double, double> part = inside(from, along);
-  const double enters = std::max(part.first, 0.0);
-  if (!(part.second > enters)) return;
-  const double edges = along.norm();
-  const int steps = std::max(1, static_cast<int>(std::ceil((part.second - enters) * edges)));
-  const double step = (part.second - enters) / steps;
-  const recon::ShiningGrid grid = shining(coarse_);
-  for (int i = 0; i < steps; ++i) {
-    const double t = enters + (i + 0.5) * step;
-    const recon::Rgba shine = static_cast<float>(edges) * at_place(grid, from + t * along);
-    recon::Rgba share = static_cast<float>(a > 0 ? a * a / (t * t + a * a) : 0) * shine;
-    share.c[3] = shine.c[3];
-    light.steps().push_back(
-        {static_cast<float>(enters + i * step), static_cast<float>(enters + (i + 1) * step), share});
-  }
-  light.end_flame();
-}
-
-std::vector<Flame::Emitter> Flame::emitters() const {
+std::vector<Flame::Emitter> Flame::glowing() const {
   std::vector<Emitter> all;
   if (medium_.count == 0) return all;
   const recon::Grid& g = coarse_.grid;
@@ -183,23 +124,6 @@ std::vector<Flame::Emitter> Flame::emitters() const {
         if (sum > 0) all.push_back({static_cast<std::uint32_t>(g.index(i, j, k)), sum / 24 * edge * edge});
       }
   return all;
-}
-
-Flame::Sent Flame::sent(std::uint32_t voxel, const Eigen::Vector3d& within) const {
-  const recon::Grid& g = coarse_.grid;
-  const auto nx = static_cast<std::uint32_t>(g.nx);
-  const auto ny = static_cast<std::uint32_t>(g.ny);
-  const Eigen::Vector3d corner(voxel % nx, voxel / nx % ny,
-                               voxel / nx / ny);  // NOLINT(bugprone-integer-division)
-  const Eigen::Vector3d origin(static_cast<double>(g.origin[0]), static_cast<double>(g.origin[1]),
-                               static_cast<double>(g.origin[2]));
-  const double edge = static_cast<double>(g.edge);
-  const recon::Rgba shine =
-      shining(coarse_).inside(coarse_.shine.data() + voxel, static_cast<float>(within[0]),
-                              static_cast<float>(within[1]), static_cast<float>(within[2]));
-  const double area = edge * edge * world_from_flame_.scale * world_from_flame_.scale;
-  return {world_from_flame_ * (origin + edge * (corner + within)),
-          area * Eigen::Vector3f(shine.c[0], shine.c[1], shine.c[2]).cast<double>()};
 }
 
 Eigen::AlignedBox3d Flame::bounds() const {

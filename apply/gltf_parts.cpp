@@ -24,9 +24,9 @@ std::vector<std::uint8_t> levels_of(const ImageView& picture) {
   return rgb;
 }
 
-Texture::Wrap wrap_of(int gltf) {
-  if (gltf == TINYGLTF_TEXTURE_WRAP_CLAMP_TO_EDGE) return Texture::Wrap::clamp;
-  return gltf == TINYGLTF_TEXTURE_WRAP_MIRRORED_REPEAT ? Texture::Wrap::mirror : Texture::Wrap::repeat;
+Wrap wrap_of(int gltf) {
+  if (gltf == TINYGLTF_TEXTURE_WRAP_CLAMP_TO_EDGE) return Wrap::clamp;
+  return gltf == TINYGLTF_TEXTURE_WRAP_MIRRORED_REPEAT ? Wrap::mirror : Wrap::repeat;
 }
 
 }  // namespace

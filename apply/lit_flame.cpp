@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <numbers>
 
-#include "apply/coarse_grid.h"
 #include "apply/flame.h"
 #include "recon/kernels/phase_function.h"
 #include "recon/render/cropped_source.h"
@@ -47,6 +46,10 @@ std::vector<float> scattered_of(const recon::Volume& volume, double albedo,
   return source;
 }
 
+Eigen::Vector3d in_edges(const recon::Grid& g, const Eigen::Vector3d& place) {
+  return (place - key_point_of(g, 0, 0, 0)) / static_cast<double>(g.edge);
+}
+
 void add(const std::vector<float>& more, std::vector<float>& to) {
   for (std::size_t i = 0; i < to.size(); ++i) to[i] += more[i];
 }
@@ -73,7 +76,9 @@ std::vector<float> Flame::arriving(const recon::Light& light, const Shade& shade
         const std::size_t p = fine.index(i, j, k);
         if (!(volume_.extinction[p] > 0)) continue;
         const Eigen::Vector3d at = in_edges(coarse, key_point_of(fine, i, j, k));
-        reach[p] *= std::clamp(at_place(between, at).c[0], 0.F, 1.F);  // beyond the grid it goes on
+        reach[p] *= std::clamp(
+            between.at(static_cast<float>(at[0]), static_cast<float>(at[1]), static_cast<float>(at[2])).c[0],
+            0.F, 1.F);  // beyond the grid it goes on
       }
   });
   return reach;
@@ -103,13 +108,19 @@ Status Flame::light_by(const recon::Light& light, std::optional<double> albedo, 
     shown.emission = volume_.emission;
   }
   add(even, shown.emission);
-  if (!was_lit) source_ = recon::cropped_source(shown, crop_, effects_.extinction.model);
+  const auto show = [&] {
+    source_ = std::make_shared<const std::vector<recon::Rgba>>(
+        recon::cropped_source(shown, crop_, effects_.extinction.model));
+  };
+  if (!was_lit) show();
   add(beam, shown.emission);
   if (was_lit)
-    source_ = recon::cropped_source(shown, crop_, effects_.extinction.model);
+    show();
   else
     beam_ = recon::cropped_source({volume_.grid, beam, {}}, crop_, recon::Extinction::Model::none);
   coarse_ = recon::coarse_medium(shown, medium_, effects_.extinction, light_voxels_, pool);
+  emitters_ = glowing();
+  on_gpu_.reset();
   return {};
 }
 

@@ -8,7 +8,7 @@
 
 #include <Eigen/Geometry>
 
-#include "apply/outside_light.h"
+#include "apply/light_tables.h"
 #include "recon/calibrate/camera_path.h"
 
 namespace emberlock::apply {
@@ -104,13 +104,17 @@ std::vector<const Flame*> Scene::burning() const {
 
 Status Scene::light_flames(recon::Pool& pool) {
   const std::vector<const Flame*> flames = burning();
-  const OutsideLight outside(file_.light, flames, surfaces_);
+  int number = 0;
   for (Player& player : players_) {
-    Flame* const flame = player.flame.get();
-    if (flame == nullptr) continue;
-    EMBERLOCK_RETURN_IF_ERROR(flame->light_by(
-        file_.light, player.placed.albedo,
-        [&](const Eigen::Vector3d& place) { return outside.reaches(place, flame); }, pool));
+    if (!player.flame) continue;
+    const LightTables tables(flames, file_.light);  // of those that were lit before too
+    const FallingLight<EmbreeTriangles, kMostFlames> falling{tables.view(), surfaces_.triangles()};
+    const auto shade = [&](const Eigen::Vector3d& place) {
+      const Eigen::Vector3f at = place.cast<float>();
+      return static_cast<double>(falling.outside_reaches({at[0], at[1], at[2]}, number));
+    };
+    EMBERLOCK_RETURN_IF_ERROR(player.flame->light_by(file_.light, player.placed.albedo, shade, pool));
+    ++number;
   }
   return {};
 }

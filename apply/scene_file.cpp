@@ -10,6 +10,7 @@
 #include <nlohmann/json.hpp>
 
 #include "apply/gltf_file.h"
+#include "apply/kernels/flame_table.h"
 #include "apply/unreadable.h"
 #include "base/file.h"
 #include "base/nesting.h"
@@ -22,7 +23,6 @@ using Json = nlohmann::json;
 
 constexpr double kFar = 1e6;
 constexpr double kDegree = std::numbers::pi / 180;
-constexpr std::size_t kMostFlames = 64;
 constexpr std::size_t kMostFiles = 256;
 constexpr std::size_t kMostStops = 10000;
 

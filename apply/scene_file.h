@@ -83,7 +83,7 @@ struct SceneFile {
   std::vector<PlacedResult> flames;  ///< 1..64
   std::vector<PlacedFile> geometry;  ///< at most 256
   CameraPlan camera;
-  recon::Light light;                     ///< OutsideLight's
+  recon::Light light;                     ///< LightTables'
   std::array<double, 3> background = {};  ///< grey levels
 };
 

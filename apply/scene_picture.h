@@ -6,19 +6,19 @@
 #include <vector>
 
 #include "apply/flame.h"
-#include "apply/outside_light.h"
 #include "apply/surfaces.h"
 #include "recon/calibrate/camera_model.h"
 #include "recon/compute/pool.h"
+#include "recon/effects/effects.h"
 #include "recon/preprocess/radiance_image.h"
 
 namespace emberlock::apply {
 
 // The picture of flames among surfaces. Through each pixel's centre all flames are marched at once
-// (ray_light.h); samples through places within the pixel meet surfaces at distances z and shine by
+// (kernels/merged_light.h); samples through places within the pixel meet surfaces at distances z and shine by
 //   L = L_flames(z) + T_flames(z) (emitted + albedo (E / pi + outside))
-// with one random sample of the flames' irradiance E each (surface_light.h), and the light from outside as it
-// falls there (outside_light.h). So flames have no noise: without surfaces a picture is that of
+// with one random sample of the flames' irradiance E each (kernels/surface_light.h), and the light from
+// outside as it falls there (light_tables.h). So flames have no noise: without surfaces a picture is that of
 // render_view(), and what isn't exact then is the difference between the light of a flame at a pixel's centre
 // and its mean over the pixel, as there.
 //
@@ -32,7 +32,7 @@ namespace emberlock::apply {
 /// What stands around flames.
 struct Surroundings {
   const Surfaces& surfaces;
-  recon::Light light = {};                ///< OutsideLight's
+  recon::Light light = {};                ///< LightTables'
   std::array<double, 3> background = {};  ///< grey levels
 };
 

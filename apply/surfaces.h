@@ -2,31 +2,28 @@
 #pragma once
 
 #include <memory>
-#include <optional>
-
-#include <Eigen/Core>
 
 #include "apply/gltf_file.h"
+#include "apply/kernels/surface.h"
 #include "base/result.h"
+
+struct RTCSceneTy;
 
 namespace emberlock::apply {
 
-/// So far from a surface its own rounding ends, metres.
-inline double clear_of_surface(const Eigen::Vector3d& place) {
-  return 1e-5 * (1 + place.cwiseAbs().maxCoeff());
-}
+/// Triangles of Embree 3; as BvhTriangles.
+struct EmbreeTriangles {
+  RTCSceneTy* scene = nullptr;  ///< null: no triangles
 
-/// A mesh that rays are cast through (Embree 3). Functions may be called by several threads.
+  [[nodiscard]] TriangleHit first(const Vec3& origin, const Vec3& direction, float nearest) const;
+  [[nodiscard]] bool blocked(const Vec3& origin, const Vec3& direction, float from, float to) const;
+};
+
+struct SurfacesOnGpu;
+
+/// A mesh that rays are cast at. Functions may be called by several threads.
 class Surfaces {
  public:
-  struct Hit {
-    double distance;         ///< along the ray, metres
-    Eigen::Vector3d normal;  ///< of the triangle, or between its vertices', unit length, on the side from
-                             ///< which the ray came
-    Eigen::Vector3d albedo;
-    Eigen::Vector3d emitted;  ///< grey levels
-  };
-
   /// Error (device): Embree can't be started, or memory is short.
   static Result<Surfaces> build(Mesh mesh);
   Surfaces(Surfaces&&) noexcept;
@@ -34,17 +31,23 @@ class Surfaces {
   ~Surfaces();
 
   [[nodiscard]] bool empty() const;
-  /// The first triangle that a ray meets farther than `nearest` metres; the direction has unit length.
-  [[nodiscard]] std::optional<Hit> first(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction,
-                                         double nearest = 0) const;
-  /// Whether a triangle stands between two distances of a ray.
-  [[nodiscard]] bool blocked(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction, double from,
-                             double to) const;
+  [[nodiscard]] const Mesh& mesh() const;
+  [[nodiscard]] EmbreeTriangles triangles() const;
+  /// Valid as long as this lives.
+  [[nodiscard]] SurfaceTable table() const;
+  /// Of the table.
+  [[nodiscard]] const std::vector<MaterialRow>& materials() const;
+  [[nodiscard]] const std::vector<TextureRow>& textures() const;
+  [[nodiscard]] const std::vector<std::uint8_t>& texels() const;
+
+  /// What it keeps in a GPU's memory from picture to picture (scene_cuda.h).
+  [[nodiscard]] std::shared_ptr<SurfacesOnGpu>& on_gpu() const { return on_gpu_; }
 
  private:
-  struct Embree;
-  explicit Surfaces(std::unique_ptr<Embree> embree);
-  std::unique_ptr<Embree> embree_;
+  struct Parts;
+  explicit Surfaces(std::unique_ptr<Parts> parts);
+  std::unique_ptr<Parts> parts_;
+  mutable std::shared_ptr<SurfacesOnGpu> on_gpu_;
 };
 
 }  // namespace emberlock::apply

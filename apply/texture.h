@@ -5,18 +5,18 @@
 #include <cstdint>
 #include <vector>
 
+#include "apply/kernels/surface.h"
+
 namespace emberlock::apply {
 
-/// A picture over surfaces: sRGB (IEC 61966-2-1), 8 bits.
+/// A picture over surfaces: sRGB (IEC 61966-2-1), 8 bits; read by SurfaceTable.
 struct Texture {
-  /// What lies beyond 0..1 along an axis.
-  enum class Wrap : std::uint8_t { repeat, mirror, clamp };
   int width = 1, height = 1;
   std::vector<std::uint8_t> rgb;  ///< rows downwards
   Wrap across = Wrap::repeat, down = Wrap::repeat;
-
-  /// Linear light, 0..1, bilinear between texels' middles; (0, 0) is the upper left corner.
-  [[nodiscard]] std::array<float, 3> at(float u, float v) const;
 };
+
+/// The linear light of each level of sRGB, 0..1.
+const std::array<float, 256>& linear_levels();
 
 }  // namespace emberlock::apply

@@ -1,12 +1,19 @@
 // SPDX-License-Identifier: Apache-2.0
-// Writes a scene to time `emberlock scene` with, and to compare it with other renderers: three flames of
-// 128^3 voxels (or another number) in a room of 10380 triangles.
-//   bench_scene FOLDER [VOXELS]; emberlock scene FOLDER/scene.json --out PICTURE --image 1280x720 --samples 2
+// Writes a scene to time with, and to compare it with other renderers: three flames of 128^3 voxels (or
+// another number) in a room of 10380 triangles. Then draws it on a device, 1280 x 720 with 2 samples a pixel,
+// once it is read, and says what each frame takes.
+//   bench_scene FOLDER [VOXELS]
+//   bench_scene --device cpu|cuda FOLDER [FRAMES]
+#include "apply/scene.h"
+
+#include <chrono>
 #include <cstdio>
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
+#include <stdexcept>
 #include <string>
+#include <vector>
 
 #include <Eigen/Core>
 #include <Eigen/Geometry>
@@ -66,12 +73,27 @@ std::string room() {
   return gltf.text();
 }
 
-}  // namespace
+Status draw(const fs::path& folder, const std::string& on, int frames) {
+  EMBERLOCK_ASSIGN_OR_RETURN(recon::Device device, recon::parse_device(on));
+  EMBERLOCK_ASSIGN_OR_RETURN(device, recon::resolve(device));
+  recon::Pool pool(0, device);
+  EMBERLOCK_ASSIGN_OR_RETURN(apply::SceneFile file, apply::read_scene(folder / "scene.json"));
+  EMBERLOCK_ASSIGN_OR_RETURN(const apply::Scene scene, apply::Scene::load(std::move(file), 48, pool));
+  EMBERLOCK_ASSIGN_OR_RETURN(const auto cameras, scene.cameras({1280, 720}, frames));
+  apply::PictureOptions options;
+  options.samples = 2;
+  for (const recon::CameraModel& camera : cameras) {
+    const auto start = std::chrono::steady_clock::now();
+    const apply::ScenePicture picture = scene.picture(camera, options, pool);
+    const double took = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+    std::printf("%s: %.1f ms, noise %.2f grey levels\n", recon::name(pool.device()).c_str(), 1e3 * took,
+                apply::rms_error(picture));
+    ++options.seed;
+  }
+  return {};
+}
 
-int main(int argc, char** argv) {
-  if (argc < 2) return std::fprintf(stderr, "usage: bench_scene FOLDER [VOXELS]\n"), 2;
-  const fs::path folder = argv[1];
-  const int voxels = argc > 2 ? std::atoi(argv[2]) : 128;
+void write(const fs::path& folder, int voxels) {
   const recon::Grid grid = recon::grid_over({Vector3d::Zero(), Vector3d::Constant(0.2)}, voxels);
   std::string flames;
   for (int f = 0; f < 3; ++f) {
@@ -82,7 +104,7 @@ int main(int argc, char** argv) {
     const std::string name = fmt::format("flame-{}", f);
     fs::create_directories(folder / name);
     const Status written = recon::write_volume(truth.volume, folder / name / "volume.vdb");
-    if (!written.ok()) return std::fprintf(stderr, "%s\n", written.error().message().c_str()), 1;
+    if (!written.ok()) throw std::runtime_error(written.error().message());
     flames +=
         fmt::format(R"({}{{"result": "{}", "position": [{}, {}, 0.3], "rotation": [0, 0, {}], "scale": 3}})",
                     f > 0 ? ", " : "", name, 0.45 * (f - 1), 0.3 * (f == 1), 40 * f);
@@ -92,5 +114,23 @@ int main(int argc, char** argv) {
                                        << flames << R"(], "geometry": [{"file": "room.gltf"}],
  "camera": {"from": [0.3, -2.4, 0.9], "look_at": [0, 0, 0.45]}})"
                                        << '\n';
+}
+
+}  // namespace
+
+int main(int argc, char** argv) try {
+  const std::vector<std::string> words(argv + 1, argv + argc);
+  if (words.size() > 2 && words[0] == "--device") {
+    const Status drawn = draw(words[2], words[1], words.size() > 3 ? std::atoi(words[3].c_str()) : 10);
+    if (!drawn.ok()) throw std::runtime_error(drawn.error().message());
+  } else if (!words.empty() && words[0][0] != '-') {
+    write(words[0], words.size() > 1 ? std::atoi(words[1].c_str()) : 128);
+  } else {
+    return std::fprintf(
+               stderr, "usage: bench_scene FOLDER [VOXELS], bench_scene --device cpu|cuda FOLDER [FRAMES]\n"),
+           2;
+  }
   return 0;
+} catch (const std::exception& e) {
+  return std::fprintf(stderr, "%s\n", e.what()), 1;
 }

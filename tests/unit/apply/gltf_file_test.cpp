@@ -94,8 +94,8 @@ TEST_F(GltfFileTest, TexturesAndNormalsAreTaken) {
   ASSERT_EQ(m.texture, 0);
   const Texture& texture = mesh_.textures.at(0);
   EXPECT_EQ(texture.width, 2);
-  EXPECT_EQ(texture.across, Texture::Wrap::clamp);
-  EXPECT_EQ(texture.down, Texture::Wrap::mirror);
+  EXPECT_EQ(texture.across, Wrap::clamp);
+  EXPECT_EQ(texture.down, Wrap::mirror);
   EXPECT_THAT(texture.rgb, ElementsAre(255, 255, 255, 0, 0, 0));
   EXPECT_THAT(mesh_.texture_places,
               ElementsAre(ElementsAre(0, 0.5F), ElementsAre(1, 0.25F), ElementsAre(0.75F, 1)));

@@ -9,6 +9,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "apply/light_tables.h"
 #include "apply/scene_picture.h"
 #include "recon/kernels/phase_function.h"
 #include "recon/render/render.h"
@@ -209,8 +210,12 @@ TEST_F(LitSceneTest, SurfacesAndOtherSmokeShadeSmoke) {
   Flame thin = smoke({-0.2, -0.2, -0.2}, 9, 9, 9, 0.05, 0.01, {recon::Scattering::Order::single, 1, 0});
   const Flame above = smoke({-1, -1, 0.5}, 33, 33, 5, 0.0625, 4, {});
   const auto lit = [&](const std::vector<const Flame*>& flames, const Surfaces& around) {
-    const OutsideLight outside(sun, flames, around);
-    expect_lit(thin, sun, {}, [&](const Eigen::Vector3d& place) { return outside.reaches(place, &thin); });
+    const LightTables tables(flames, sun);
+    const FallingLight<EmbreeTriangles, 4> falling{tables.view(), around.triangles()};
+    expect_lit(thin, sun, {}, [&](const Eigen::Vector3d& place) {
+      const Eigen::Vector3f at = place.cast<float>();
+      return static_cast<double>(falling.outside_reaches({at[0], at[1], at[2]}, 0));
+    });
     return red(picture({&thin}, nothing, sun, camera));
   };
   const float open = lit({&thin}, nothing);

@@ -8,7 +8,7 @@
 
 #include <gtest/gtest.h>
 
-#include "apply/surface_light.h"
+#include "apply/light_tables.h"
 #include "recon/render/render.h"
 #include "tests/support/camera_at.h"
 #include "tests/support/small_scene.h"
@@ -291,7 +291,6 @@ TEST_F(ScenePictureTest, SamplesOfTheIrradianceAreRightInTheMean) {
     return std::array<float, 4>{100, 100, 100, kSigma};
   }));
   const std::vector<const Flame*> flames{&cube};
-  const Eigen::Vector3d up = Eigen::Vector3d::UnitZ();
   for (const double x : {0.0, 0.12, 0.4}) {
     const Eigen::Vector3d place(x, 0.03, -0.01);
     constexpr int kBoxes = 60;
@@ -311,13 +310,17 @@ TEST_F(ScenePictureTest, SamplesOfTheIrradianceAreRightInTheMean) {
     Mesh nothing;
     test::add_square(nothing, 50, 50, 0, 0.1);  // elsewhere
     const Surfaces away = built(std::move(nothing));
-    const SurfaceLight unhidden(flames, away);
-    SurfaceLight::Scratch scratch;
-    Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+    const LightTables tables(flames, {});
+    const FallingLight<EmbreeTriangles, 4> unhidden{tables.view(), away.triangles()};
+    double light = 0;
     constexpr int kSamples = 20000;
+    const Eigen::Vector3f at = place.cast<float>();
     for (int s = 0; s < kSamples; ++s)
-      sum += unhidden.sample(place, up, {1, static_cast<std::uint64_t>(1000 * x), s, kSamples}, scratch);
-    EXPECT_NEAR(sum[0] / kSamples, expected, 0.02 * expected) << x;
+      light += static_cast<double>(unhidden
+                                       .of_flames({at[0], at[1], at[2]}, {0, 0, 1},
+                                                  {1, static_cast<std::uint64_t>(1000 * x), s, kSamples})
+                                       .x);
+    EXPECT_NEAR(light / kSamples, expected, 0.02 * expected) << x;
   }
 }
 

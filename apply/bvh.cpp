@@ -32,13 +32,14 @@ RTCBuildArguments arguments_for(std::vector<RTCBuildPrimitive>& boxes, RTCBVH tr
   build.primitiveCount = build.primitiveArrayCapacity = boxes.size();
   build.createNode = [](RTCThreadLocalAllocator space, unsigned, void*) { return new_branch(space); };
   build.setNodeChildren = [](void* node, void** children, unsigned count, void*) {
-    for (unsigned c = 0; c < count; ++c) static_cast<Branch*>(node)->child[c] = static_cast<Branch*>(children[c]);
+    for (unsigned c = 0; c < count; ++c)
+      static_cast<Branch*>(node)->child[c] = static_cast<Branch*>(children[c]);
   };
   build.setNodeBounds = [](void* node, const RTCBounds** bounds, unsigned count, void*) {
     for (unsigned c = 0; c < count; ++c) static_cast<Branch*>(node)->bounds[c] = *bounds[c];
   };
-  build.createLeaf = [](RTCThreadLocalAllocator space, const RTCBuildPrimitive* boxes_there, std::size_t count,
-                        void*) {
+  build.createLeaf = [](RTCThreadLocalAllocator space, const RTCBuildPrimitive* boxes_there,
+                        std::size_t count, void*) {
     void* const made = new_branch(space);
     auto* const leaf = static_cast<Branch*>(made);
     leaf->count = static_cast<std::uint32_t>(count);
@@ -100,7 +101,8 @@ Result<Bvh> build_bvh(const Mesh& mesh) {
   const RTCBuildArguments build = arguments_for(boxes, tree.get());
   const auto* const root = static_cast<const Branch*>(rtcBuildBVH(&build));
   if (root == nullptr)
-    return Error{ErrorKind::device, "not enough memory for its triangles", "geometry", "Simplify the geometry"};
+    return Error{ErrorKind::device, "not enough memory for its triangles", "geometry",
+                 "Simplify the geometry"};
   lay_out(mesh, *root, bvh);
   return bvh;
 }

@@ -33,7 +33,7 @@ struct Mesh {
   std::vector<std::array<float, 3>>
       normals;  ///< of each vertex, unit length, or 0: as its triangles; may be empty
 };
-inline constexpr std::size_t kMostTriangles = 5'000'000;
+inline constexpr std::size_t kMostTriangles = 10'000'000;
 inline constexpr std::size_t kMostTexels = std::size_t{1} << 28;
 
 /// What a glTF 2.0 file holds beside triangles. Its nodes are placed in the world.

@@ -18,7 +18,8 @@ OutsideTable outside_of(const recon::Light& light) {
   if (light.source == recon::Light::Source::nearby) table.source = OutsideTable::Source::nearby;
   if (light.source != recon::Light::Source::distant) return table;
   table.source = OutsideTable::Source::distant;
-  const Eigen::Vector3d towards = Eigen::Vector3d(light.place[0], light.place[1], light.place[2]).normalized();
+  const Eigen::Vector3d towards =
+      Eigen::Vector3d(light.place[0], light.place[1], light.place[2]).normalized();
   table.place = vec3_from({towards[0], towards[1], towards[2]});
   return table;
 }

@@ -10,10 +10,10 @@
 
 namespace emberlock::apply {
 
-/// What FallingLight needs of flames, and of light from outside, in the CPU's memory. `light` is recon::Light (`none`,
-/// `distant` or `nearby`, in the world) as matter of albedo 1 scatters it, so its strength is a quarter of the radiance of
-/// a white surface that faces it, from a metre if it is nearby. Surfaces hide it and smoke dims it; `ambient` comes
-/// everywhere.
+/// What FallingLight needs of flames, and of light from outside, in the CPU's memory. `light` is recon::Light
+/// (`none`, `distant` or `nearby`, in the world) as matter of albedo 1 scatters it, so its strength is a
+/// quarter of the radiance of a white surface that faces it, from a metre if it is nearby. Surfaces hide it
+/// and smoke dims it; `ambient` comes everywhere.
 class LightTables {
  public:
   /// At most kMostFlames of them, which must outlive it.

@@ -17,7 +17,8 @@ struct SurfacesOnGpu {
   explicit SurfacesOnGpu(const SurfaceWork& work)
       : vertices(work.table.vertices, 3 * work.vertices),
         normals(work.table.normals, work.table.normals != nullptr ? 3 * work.vertices : 0),
-        texture_places(work.table.texture_places, work.table.texture_places != nullptr ? 2 * work.vertices : 0),
+        texture_places(work.table.texture_places,
+                       work.table.texture_places != nullptr ? 2 * work.vertices : 0),
         linear(work.table.linear, 256),
         corners(work.bvh.corners, 9 * work.triangles),
         triangles(work.table.triangles, 3 * work.triangles),
@@ -80,7 +81,8 @@ class FlamesOfPicture {
     if (table.there) {
       const auto rays = recon::GpuRays::of(*work.rays);
       table.rays = rays->table();
-      recon::launch(rays->pixels.size(), NumberRay{rays->pixels.data(), ray_of_pixel.data()}, "numbering rays");
+      recon::launch(rays->pixels.size(), NumberRay{rays->pixels.data(), ray_of_pixel.data()},
+                    "numbering rays");
       rays_.push_back(rays);
     }
     table.ray_of_pixel = ray_of_pixel.data();
@@ -101,8 +103,8 @@ void trace(const PixelTask& task, const LightTable& lights, const BvhTriangles& 
 
 }  // namespace
 
-void trace_on_cuda(const std::vector<FlameWork>& flames, const LightTable& lights, const SurfaceWork& surfaces,
-                   const PixelTask& task, std::size_t pixels) {
+void trace_on_cuda(const std::vector<FlameWork>& flames, const LightTable& lights,
+                   const SurfaceWork& surfaces, const PixelTask& task, std::size_t pixels) {
   const FlamesOfPicture tables(flames, pixels);
   if (!*surfaces.kept) *surfaces.kept = std::make_shared<SurfacesOnGpu>(surfaces);
   const CudaBuffer<EmitterRow> emitters(lights.emitters, lights.glowing);

@@ -32,7 +32,7 @@ struct SurfaceWork {
 };
 
 /// TracePixel of all pixels on a GPU; `task`'s picture is in the CPU's memory. Throws a DeviceError.
-void trace_on_cuda(const std::vector<FlameWork>& flames, const LightTable& lights, const SurfaceWork& surfaces,
-                   const PixelTask& task, std::size_t pixels);
+void trace_on_cuda(const std::vector<FlameWork>& flames, const LightTable& lights,
+                   const SurfaceWork& surfaces, const PixelTask& task, std::size_t pixels);
 
 }  // namespace emberlock::apply

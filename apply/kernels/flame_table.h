@@ -34,7 +34,9 @@ struct FlameTable {
   bool there = false;       ///< otherwise it is empty
   bool absorbs = false;
 
-  [[nodiscard]] HOST_DEVICE inline recon::Rgba coarse_at(const Vec3& p) const { return coarse.at(p.x, p.y, p.z); }
+  [[nodiscard]] HOST_DEVICE inline recon::Rgba coarse_at(const Vec3& p) const {
+    return coarse.at(p.x, p.y, p.z);
+  }
 
   /// How much of the light of a part at distance r is taken along rays, and not from parts that are chosen by
   /// their power: a^2 / (r^2 + a^2), with this a, metres: the coarse grid's edge, and 0 at places farther
@@ -70,7 +72,8 @@ struct FlameTable {
   }
 
   /// The optical depth of a ray as far as `distance`.
-  [[nodiscard]] HOST_DEVICE inline float depth(const Vec3& origin, const Vec3& direction, float distance) const {
+  [[nodiscard]] HOST_DEVICE inline float depth(const Vec3& origin, const Vec3& direction,
+                                               float distance) const {
     if (!there || !absorbs) return 0;
     const Vec3 from = coarse_from_world.place(origin);
     const Vec3 along = coarse_from_world.direction(direction);  // of a metre
@@ -86,8 +89,8 @@ struct FlameTable {
     return sum * edges / static_cast<float>(steps);
   }
 
-  /// A place in a voxel of the coarse grid (within: 0..1 along each edge), and what it sends out: the source there
-  /// times the voxel's volume, grey levels m2.
+  /// A place in a voxel of the coarse grid (within: 0..1 along each edge), and what it sends out: the source
+  /// there times the voxel's volume, grey levels m2.
   HOST_DEVICE inline void sent(std::uint32_t voxel, const Vec3& within, Vec3& place, Vec3& power) const {
     const auto nx = static_cast<std::uint32_t>(coarse.nx);
     const auto ny = static_cast<std::uint32_t>(coarse.ny);
@@ -159,8 +162,8 @@ struct FineSteps {
   }
 };
 
-/// A flame's steps along any ray, by its coarse grid; of its light the share that close_by() says, of this a; of its
-/// extinction all.
+/// A flame's steps along any ray, by its coarse grid; of its light the share that close_by() says, of this a;
+/// of its extinction all.
 struct CoarseSteps {
   const FlameTable* flame;
   Vec3 from, along;  // coarse edges; of a metre

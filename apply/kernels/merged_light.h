@@ -9,9 +9,10 @@ namespace emberlock::apply {
 /// Radiance in lanes 0..2, transmittance in lane 3: nothing yet.
 HOST_DEVICE inline recon::Rgba clear_view() { return recon::Rgba{{0, 0, 0, 1}}; }
 
-/// The light behind a stretch of constant values, from that before it: as in the march (recon/render/render.h),
-/// L += T S ds phi(sigma ds), T *= exp(-sigma ds).
-HOST_DEVICE inline recon::Rgba light_behind(const recon::Rgba& before, const recon::Rgba& shine, float length) {
+/// The light behind a stretch of constant values, from that before it: as in the march
+/// (recon/render/render.h), L += T S ds phi(sigma ds), T *= exp(-sigma ds).
+HOST_DEVICE inline recon::Rgba light_behind(const recon::Rgba& before, const recon::Rgba& shine,
+                                            float length) {
   const float depth = shine.c[3] * length;
   const float mean = recon::phi(depth);
   recon::Rgba after = before + (before.c[3] * length * mean) * shine;
@@ -20,8 +21,8 @@ HOST_DEVICE inline recon::Rgba light_behind(const recon::Rgba& before, const rec
 }
 
 /// What flames do to the light along one ray, several of them merged by distance: each is a row of steps with
-/// constant values, from near to far without overlaps; where those of several flames overlap, their emission and their
-/// extinction add up. `Steps` has next(Step&), which says whether there was another one.
+/// constant values, from near to far without overlaps; where those of several flames overlap, their emission
+/// and their extinction add up. `Steps` has next(Step&), which says whether there was another one.
 template <class Steps, int kMost>
 struct MergedLight {
   Steps steps[kMost];

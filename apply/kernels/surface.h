@@ -34,11 +34,11 @@ struct Surface {
 
 /// A mesh (gltf_file.h) as plain pointers.
 struct SurfaceTable {
-  const float* vertices = nullptr;              ///< three of each
-  const std::uint32_t* triangles = nullptr;     ///< three vertices of each
-  const std::uint32_t* material = nullptr;      ///< of each triangle
-  const float* normals = nullptr;               ///< three of each vertex, 0: as its triangles; or null
-  const float* texture_places = nullptr;        ///< two of each vertex; or null
+  const float* vertices = nullptr;           ///< three of each
+  const std::uint32_t* triangles = nullptr;  ///< three vertices of each
+  const std::uint32_t* material = nullptr;   ///< of each triangle
+  const float* normals = nullptr;            ///< three of each vertex, 0: as its triangles; or null
+  const float* texture_places = nullptr;     ///< two of each vertex; or null
   const MaterialRow* materials = nullptr;
   const TextureRow* textures = nullptr;
   const std::uint8_t* texels = nullptr;  ///< sRGB, three bytes of each
@@ -55,7 +55,8 @@ struct SurfaceTable {
     Surface surface{flat, is.albedo, is.emitted};
     if (normals != nullptr) {
       Vec3 smooth;
-      for (int c = 0; c < 3; ++c) smooth = smooth + weights[c] * vec3_at(normals + std::size_t{3} * corners[c]);
+      for (int c = 0; c < 3; ++c)
+        smooth = smooth + weights[c] * vec3_at(normals + std::size_t{3} * corners[c]);
       const float size = length(smooth);
       if (size > 0) surface.normal = ((dot(smooth, flat) < 0 ? -1 : 1) / size) * smooth;
     }
@@ -84,9 +85,12 @@ struct SurfaceTable {
       const int dx = corner & 1;
       const int dy = corner >> 1;
       const float weight = (dx != 0 ? x - left : 1 - (x - left)) * (dy != 0 ? y - top : 1 - (y - top));
-      const auto row = static_cast<std::size_t>(wrapped(static_cast<int>(top) + dy, texture.height, texture.down));
-      const auto column = static_cast<std::size_t>(wrapped(static_cast<int>(left) + dx, texture.width, texture.across));
-      const std::uint8_t* rgb = texels + 3 * (texture.first + row * static_cast<std::size_t>(texture.width) + column);
+      const auto row =
+          static_cast<std::size_t>(wrapped(static_cast<int>(top) + dy, texture.height, texture.down));
+      const auto column =
+          static_cast<std::size_t>(wrapped(static_cast<int>(left) + dx, texture.width, texture.across));
+      const std::uint8_t* rgb =
+          texels + 3 * (texture.first + row * static_cast<std::size_t>(texture.width) + column);
       sum = sum + weight * Vec3{linear[rgb[0]], linear[rgb[1]], linear[rgb[2]]};
     }
     return sum;

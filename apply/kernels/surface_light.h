@@ -23,7 +23,8 @@ struct Draw {
   int sample, samples;
 
   [[nodiscard]] HOST_DEVICE inline double number(int i) const {
-    return random_uniform(seed, stream, kEach * static_cast<std::uint64_t>(sample) + static_cast<std::uint64_t>(i));
+    return random_uniform(seed, stream,
+                          kEach * static_cast<std::uint64_t>(sample) + static_cast<std::uint64_t>(i));
   }
   /// Evenly spread over the pixel's samples.
   [[nodiscard]] HOST_DEVICE inline double spread(int i) const { return (sample + number(i)) / samples; }
@@ -43,9 +44,10 @@ struct LightTable {
   const FlameTable* flames = nullptr;
   int count = 0;  ///< of flames
   const EmitterRow* emitters = nullptr;
-  const double* power_until = nullptr;   ///< of each emitter: its own and all before it
-  std::uint32_t glowing = 0;             ///< emitters
-  const std::uint32_t* guide = nullptr;  ///< the first emitter of each equal share of the power (Chen and Asau 1974)
+  const double* power_until = nullptr;  ///< of each emitter: its own and all before it
+  std::uint32_t glowing = 0;            ///< emitters
+  const std::uint32_t* guide =
+      nullptr;  ///< the first emitter of each equal share of the power (Chen and Asau 1974)
   std::uint32_t shares = 0;
   OutsideTable outside;
 };
@@ -66,7 +68,8 @@ struct FallingLight : LightTable {
   Triangles triangles;
 
   /// At a surface with this normal (unit length), grey levels times steradian.
-  [[nodiscard]] HOST_DEVICE inline Vec3 of_flames(const Vec3& place, const Vec3& normal, const Draw& draw) const {
+  [[nodiscard]] HOST_DEVICE inline Vec3 of_flames(const Vec3& place, const Vec3& normal,
+                                                  const Draw& draw) const {
     if (glowing == 0) return {};
     bool close = false;
     for (int f = 0; f < count; ++f) close = close || flames[f].close_by(place) > 0;
@@ -100,7 +103,8 @@ struct FallingLight : LightTable {
   static constexpr int kFirstOfProposals = 2;  // of a draw's numbers; those before are the ray's
   static_assert(kFirstOfProposals + 5 * kProposals <= Draw::kEach);
 
-  /// A place that sends light, and how much would arrive if nothing stood between, over the chance of its proposal.
+  /// A place that sends light, and how much would arrive if nothing stood between, over the chance of its
+  /// proposal.
   struct Proposal {
     Vec3 place, irradiance;
   };
@@ -115,7 +119,8 @@ struct FallingLight : LightTable {
   }
 
   /// `which`: 0..1 over the flames' power.
-  HOST_DEVICE inline Proposal proposed(const Vec3& place, const Vec3& normal, double which, const Vec3& within) const {
+  HOST_DEVICE inline Proposal proposed(const Vec3& place, const Vec3& normal, double which,
+                                       const Vec3& within) const {
     const double all = power_until[glowing - 1];
     auto share = static_cast<std::uint32_t>(which * shares);
     if (share >= shares) share = shares - 1;
@@ -141,7 +146,8 @@ struct FallingLight : LightTable {
     Proposal taken;
     for (int i = 0; i < kProposals; ++i) {
       const int first = kFirstOfProposals + 5 * i;
-      const Vec3 within{static_cast<float>(draw.number(first + 1)), static_cast<float>(draw.number(first + 2)),
+      const Vec3 within{static_cast<float>(draw.number(first + 1)),
+                        static_cast<float>(draw.number(first + 2)),
                         static_cast<float>(draw.number(first + 3))};
       const Proposal one = proposed(place, normal, (i + draw.spread(first)) / kProposals, within);
       const float light = sum(one.irradiance);
@@ -165,8 +171,8 @@ struct FallingLight : LightTable {
     const float radius = sqrtf(outwards);
     const float angle = 2 * kPi * static_cast<float>(draw.number(1));
     const Vec3 aside = across(normal);
-    const Vec3 direction = radius * (cosf(angle) * aside + sinf(angle) * cross(normal, aside)) +
-                           sqrtf(1 - outwards) * normal;
+    const Vec3 direction =
+        radius * (cosf(angle) * aside + sinf(angle) * cross(normal, aside)) + sqrtf(1 - outwards) * normal;
     MergedLight<CoarseSteps, kMost> along;
     for (int f = 0; f < count; ++f)
       along.add(CoarseSteps::of(flames[f], place, direction, flames[f].close_by(place)));

@@ -35,7 +35,7 @@ struct PixelTask {
   Vec3 eye, background;
   int samples = 1;
   std::uint64_t seed = 0;
-  bool bare = false;  ///< there are no surfaces
+  bool bare = false;     ///< there are no surfaces
   float* rgb = nullptr;  ///< three of each pixel
   float* opacity = nullptr;
   float* error = nullptr;
@@ -117,7 +117,8 @@ struct TracePixel : PixelTask {
       for (int n = 0; n < here; ++n) {
         const int i = order[n];
         const float through = before[n].c[3];
-        const Vec3 behind = hits[i].any() ? shine(hits[i], directions[i], {seed, pixel, first + i, samples}) : background;
+        const Vec3 behind =
+            hits[i].any() ? shine(hits[i], directions[i], {seed, pixel, first + i, samples}) : background;
         const Vec3 seen = Vec3{before[n].c[0], before[n].c[1], before[n].c[2]} + through * behind;
         light[0] += double(seen.x);
         light[1] += double(seen.y);

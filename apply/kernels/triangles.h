@@ -28,8 +28,8 @@ struct BvhNode {
 };
 inline constexpr int kDeepestBvh = 48;
 
-/// A ray made ready for triangles, so that no ray slips between two (Woop, Benthin and Wald 2013, "Watertight Ray/Triangle
-/// Intersection"): axes turned so that it runs along the third.
+/// A ray made ready for triangles, so that no ray slips between two (Woop, Benthin and Wald 2013, "Watertight
+/// Ray/Triangle Intersection"): axes turned so that it runs along the third.
 struct WatertightRay {
   Vec3 origin;
   int kx, ky, kz;
@@ -37,7 +37,8 @@ struct WatertightRay {
 
   HOST_DEVICE inline WatertightRay(const Vec3& from, const Vec3& along) : origin(from) {
     const float d[3] = {along.x, along.y, along.z};
-    kz = fabsf(d[0]) > fabsf(d[1]) ? (fabsf(d[0]) > fabsf(d[2]) ? 0 : 2) : (fabsf(d[1]) > fabsf(d[2]) ? 1 : 2);
+    kz =
+        fabsf(d[0]) > fabsf(d[1]) ? (fabsf(d[0]) > fabsf(d[2]) ? 0 : 2) : (fabsf(d[1]) > fabsf(d[2]) ? 1 : 2);
     kx = (kz + 1) % 3;
     ky = (kx + 1) % 3;
     if (d[kz] < 0) {
@@ -94,20 +95,22 @@ struct BvhTriangles {
   const float* corners = nullptr;           ///< nine of each, in the tree's order
   const std::uint32_t* triangle = nullptr;  ///< the number of each
 
-  [[nodiscard]] HOST_DEVICE inline TriangleHit first(const Vec3& origin, const Vec3& direction, float nearest) const {
+  [[nodiscard]] HOST_DEVICE inline TriangleHit first(const Vec3& origin, const Vec3& direction,
+                                                     float nearest) const {
     TriangleHit hit;
     walk(origin, direction, nearest, hit, false);
     return hit;
   }
-  [[nodiscard]] HOST_DEVICE inline bool blocked(const Vec3& origin, const Vec3& direction, float from, float to) const {
+  [[nodiscard]] HOST_DEVICE inline bool blocked(const Vec3& origin, const Vec3& direction, float from,
+                                                float to) const {
     TriangleHit hit;
     hit.distance = to;
     return walk(origin, direction, from, hit, true);
   }
 
  private:
-  /// Where a ray enters a box, or beyond `farthest`. Widened by the rounding of its products (Ize 2013, "Robust BVH Ray
-  /// Traversal").
+  /// Where a ray enters a box, or beyond `farthest`. Widened by the rounding of its products (Ize 2013,
+  /// "Robust BVH Ray Traversal").
   HOST_DEVICE static inline float enters(const BvhNode& node, const float* origin, const float* inverse,
                                          float farthest) {
     constexpr float kRounding = 1.0000004F;
@@ -129,7 +132,8 @@ struct BvhTriangles {
     const float o[3] = {origin.x, origin.y, origin.z};
     const float d[3] = {direction.x, direction.y, direction.z};
     float inverse[3];
-    for (int i = 0; i < 3; ++i) inverse[i] = d[i] == 0 ? 1e30F : 1 / d[i];  // no infinity, which times 0 is none
+    for (int i = 0; i < 3; ++i)
+      inverse[i] = d[i] == 0 ? 1e30F : 1 / d[i];  // no infinity, which times 0 is none
     std::uint32_t later[kDeepestBvh];
     int held = 0;
     std::uint32_t at = 0;

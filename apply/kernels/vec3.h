@@ -25,7 +25,8 @@ HOST_DEVICE inline Vec3 cross(const Vec3& a, const Vec3& b) {
 HOST_DEVICE inline Vec3 at_least_zero(const Vec3& a) { return {fmaxf(a.x, 0), fmaxf(a.y, 0), fmaxf(a.z, 0)}; }
 HOST_DEVICE inline Vec3 vec3_at(const float* p) { return {p[0], p[1], p[2]}; }
 
-/// Some direction across a unit vector, of unit length (Duff et al. 2017, "Building an Orthonormal Basis, Revisited").
+/// Some direction across a unit vector, of unit length (Duff et al. 2017, "Building an Orthonormal Basis,
+/// Revisited").
 HOST_DEVICE inline Vec3 across(const Vec3& n) {
   const float sign = n.z < 0 ? -1.F : 1.F;
   const float a = -1 / (sign + n.z);

@@ -30,6 +30,8 @@ using namespace emberlock;
 namespace fs = std::filesystem;
 using Eigen::Vector3d;
 
+constexpr int kLightVoxels = 48;
+
 /// A wall of 36 x 36 squares from a corner along two edges.
 void add_wall(test::GltfText& gltf, const Vector3d& corner, const Vector3d& along, const Vector3d& across,
               int squares) {
@@ -73,13 +75,29 @@ std::string room() {
   return gltf.text();
 }
 
+/// What there is to do: rays and steps of the march through the flames, and voxels from which light is drawn.
+Status count(const apply::SceneFile& file, const recon::CameraModel& camera, recon::Pool& pool) {
+  recon::RayCounts all;
+  std::size_t emitters = 0;
+  for (const apply::PlacedResult& placed : file.flames) {
+    EMBERLOCK_ASSIGN_OR_RETURN(recon::ShownVolume shown, recon::read_shown_volume(placed.result));
+    const apply::Flame flame(std::move(shown), placed.world_from_flame, 1, kLightVoxels, pool);
+    all = all + flame.seen_by(camera, 1, pool).rays.count();
+    emitters += flame.emitters().size();
+  }
+  std::printf("%zu rays, %zu runs, %zu steps; %zu voxels send light\n", static_cast<std::size_t>(all.rays),
+              static_cast<std::size_t>(all.runs), static_cast<std::size_t>(all.samples), emitters);
+  return {};
+}
+
 Status draw(const fs::path& folder, const std::string& on, int frames) {
   EMBERLOCK_ASSIGN_OR_RETURN(recon::Device device, recon::parse_device(on));
   EMBERLOCK_ASSIGN_OR_RETURN(device, recon::resolve(device));
   recon::Pool pool(0, device);
-  EMBERLOCK_ASSIGN_OR_RETURN(apply::SceneFile file, apply::read_scene(folder / "scene.json"));
-  EMBERLOCK_ASSIGN_OR_RETURN(const apply::Scene scene, apply::Scene::load(std::move(file), 48, pool));
+  EMBERLOCK_ASSIGN_OR_RETURN(const apply::SceneFile file, apply::read_scene(folder / "scene.json"));
+  EMBERLOCK_ASSIGN_OR_RETURN(const apply::Scene scene, apply::Scene::load(file, kLightVoxels, pool));
   EMBERLOCK_ASSIGN_OR_RETURN(const auto cameras, scene.cameras({1280, 720}, frames));
+  EMBERLOCK_RETURN_IF_ERROR(count(file, cameras.front(), pool));
   apply::PictureOptions options;
   options.samples = 2;
   for (const recon::CameraModel& camera : cameras) {

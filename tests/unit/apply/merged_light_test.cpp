@@ -49,14 +49,15 @@ TEST(MergedLight, AStretchThatIsCutShinesAsItsPart) {
   EXPECT_EQ(up_to(flame, 0.5F).c[0], 0);
   EXPECT_NEAR(static_cast<double>(up_to(flame, 1.25F).c[0]), shine(100, 0.5, 0.25), 1e-4);
   const double through = std::exp(-0.5);
-  EXPECT_NEAR(static_cast<double>(up_to(flame, 2.5F).c[1]), 2 * (shine(100, 0.5, 1) + through * shine(50, 2, 0.5)),
-              1e-3);
+  EXPECT_NEAR(static_cast<double>(up_to(flame, 2.5F).c[1]),
+              2 * (shine(100, 0.5, 1) + through * shine(50, 2, 0.5)), 1e-3);
   EXPECT_NEAR(static_cast<double>(up_to(flame, 9).c[3]), std::exp(-2.5), 1e-6);
   EXPECT_EQ(up_to(flame, 9).c[0], up_to(flame, kBeyond).c[0]);
 }
 
 TEST(MergedLight, AscendingDistancesAreTakenInOneMarch) {
-  const std::vector<Row> flames{{{shining(1, 2, 100, 0.5F), shining(2, 3, 50, 2)}}, {{shining(1.5F, 4, 7, 0.1F)}}};
+  const std::vector<Row> flames{{{shining(1, 2, 100, 0.5F), shining(2, 3, 50, 2)}},
+                                {{shining(1.5F, 4, 7, 0.1F)}}};
   MergedLight<Row, 4> merged;
   for (const Row& flame : flames) merged.add(flame);
   const float distances[] = {0.5F, 1.2F, 1.2F, 1.5F, 2, 2.7F, 5, kBeyond};
@@ -82,7 +83,8 @@ TEST(MergedLight, FlamesThatOverlapAddUpWhereTheyDo) {
 TEST(MergedLight, AGapBetweenTwoFlamesIsClear) {
   const std::vector<Row> flames{{{shining(5, 6, 8, 1)}}, {{shining(1, 2, 4, 1)}}};
   EXPECT_NEAR(static_cast<double>(up_to(flames, 4).c[0]), shine(4, 1, 1), 1e-5);
-  EXPECT_NEAR(static_cast<double>(up_to(flames, kBeyond).c[0]), shine(4, 1, 1) + std::exp(-1.0) * shine(8, 1, 1), 1e-5);
+  EXPECT_NEAR(static_cast<double>(up_to(flames, kBeyond).c[0]),
+              shine(4, 1, 1) + std::exp(-1.0) * shine(8, 1, 1), 1e-5);
 }
 
 }  // namespace

@@ -49,8 +49,12 @@ class Furnished {
       recon::Lighting lighting;
       if (f == 4) lighting.scattering = {recon::Scattering::Order::multiple, 0.7, 0.3};
       flames_.push_back(std::make_unique<Flame>(recon::ShownVolume{std::move(volume), lighting},
-                                                test::moved(0.25 * f - 0.6, 0.1 * (f % 2), 0.05), 1, 16, pool));
-      EXPECT_TRUE(flames_.back()->light_by(light_, {}, [](const Eigen::Vector3d&) { return 0.5; }, pool).ok());
+                                                test::moved(0.25 * f - 0.6, 0.1 * (f % 2), 0.05), 1, 16,
+                                                pool));
+      EXPECT_TRUE(flames_.back()
+                      ->light_by(
+                          light_, {}, [](const Eigen::Vector3d&) { return 0.5; }, pool)
+                      .ok());
     }
   }
   [[nodiscard]] ScenePicture picture(std::size_t count, const Surfaces& surfaces, recon::Pool& on) const {
@@ -58,8 +62,8 @@ class Furnished {
     for (std::size_t f = 0; f < count; ++f) some.push_back(flames_[f].get());
     PictureOptions options;
     options.samples = 20;
-    return scene_picture(some, {surfaces, light_, {1, 2, 3}}, test::camera_at({0.3, -1.6, 0.9}, {0, 0, 0.1}, kPicture, 45),
-                         options, on);
+    return scene_picture(some, {surfaces, light_, {1, 2, 3}},
+                         test::camera_at({0.3, -1.6, 0.9}, {0, 0, 0.1}, kPicture, 45), options, on);
   }
 
   recon::Pool pool;
@@ -69,7 +73,8 @@ class Furnished {
   std::vector<std::unique_ptr<Flame>> flames_;
 };
 
-/// Of two pictures with the same random numbers: a ray may meet another triangle at an edge, or another voxel.
+/// Of two pictures with the same random numbers: a ray may meet another triangle at an edge, or another
+/// voxel.
 void expect_alike(const ScenePicture& a, const ScenePicture& b) {
   float brightest = 0;
   std::size_t off = 0;
@@ -92,7 +97,8 @@ TEST_P(SceneDevices, DrawsWhatTheCpuDraws) {
   for (const std::size_t count : {std::size_t{3}, std::size_t{5}}) {
     const ScenePicture expected = scene.picture(count, *surfaces, cpu);
     // Twice: what is kept on a device from one picture to the next.
-    for (int again = 0; again < 2; ++again) expect_alike(expected, scene.picture(count, *surfaces, scene.pool));
+    for (int again = 0; again < 2; ++again)
+      expect_alike(expected, scene.picture(count, *surfaces, scene.pool));
   }
 }
 
@@ -113,7 +119,8 @@ TEST(SceneKernels, ATreeOfBoxesShowsWhatEmbreeShows) {
   auto surfaces = Surfaces::build(furnished());
   const auto bvh = build_bvh(furnished());
   ASSERT_TRUE(surfaces.ok() && bvh.ok());
-  const Flame flame({test::volume_of({{0, 0, 0.05F}, 0.02F, 10, 11, 12}, test::uneven(1, 2000, 15))}, {}, 1, 16, pool);
+  const Flame flame({test::volume_of({{0, 0, 0.05F}, 0.02F, 10, 11, 12}, test::uneven(1, 2000, 15))}, {}, 1,
+                    16, pool);
   const std::vector<const Flame*> flames{&flame};
   const recon::CameraModel camera = test::camera_at({0.3, -1.6, 0.9}, {0, 0, 0.1}, kPicture, 45);
   PictureOptions options;

@@ -144,8 +144,7 @@ EditFile edits_of(const Json& json, const std::filesystem::path& folder) {
   if (fields.need("version") != 1) refuse("isn't 1", "version", "Another version wrote this file");
   EditFile edits;
   if (const Json* const scene = fields.find("scene"))
-    each_of(*scene, "scene", kMostViews,
-            [&](Fields& view) { edits.scene.push_back(known_view_of(view)); });
+    each_of(*scene, "scene", kMostViews, [&](Fields& view) { edits.scene.push_back(known_view_of(view)); });
   if (fields.find("voxels") != nullptr)
     edits.voxels = static_cast<int>(fields.whole("voxels", 1, kMostVoxels));
   if (fields.find("passes") != nullptr)

@@ -231,8 +231,7 @@ const std::string* view_of(const Operation& operation) {
 }
 
 recon::SharedImage edited_picture(const recon::SharedImage& captured, const std::string& view,
-                                  const std::vector<const Operation*>& operations,
-                                  const FindObject& object) {
+                                  const std::vector<const Operation*>& operations, const FindObject& object) {
   const auto concerns = [&](const Operation* o) {
     const std::string* const of = view_of(*o);
     return of != nullptr && *of == view;

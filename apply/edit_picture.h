@@ -30,7 +30,6 @@ const std::string* view_of(const Operation& operation);
 /// What operations, in their order, make of a view's captured picture: a function of these alone, and the
 /// captured picture itself where none is about this view. No pixel becomes negative that wasn't.
 recon::SharedImage edited_picture(const recon::SharedImage& captured, const std::string& view,
-                                  const std::vector<const Operation*>& operations,
-                                  const FindObject& object);
+                                  const std::vector<const Operation*>& operations, const FindObject& object);
 
 }  // namespace emberlock::apply

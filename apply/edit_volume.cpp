@@ -25,11 +25,24 @@ Eigen::Vector3d place_of(const recon::Grid& grid, int i, int j, int k) {
   return {along(0, i), along(1, j), along(2, k)};
 }
 
+/// Those that a region reaches, its edge included.
 template <class Act>
-void each_key_point(const recon::Grid& grid, const Act& act) {
-  for (int k = 0; k < grid.nz; ++k)
-    for (int j = 0; j < grid.ny; ++j)
-      for (int i = 0; i < grid.nx; ++i) act(grid.index(i, j, k), place_of(grid, i, j, k));
+void each_key_point(const recon::Grid& grid, const Region& region, const Act& act) {
+  const int count[3] = {grid.nx, grid.ny, grid.nz};
+  int first[3];
+  int last[3];
+  for (int a = 0; a < 3; ++a) {
+    const double half = 0.5 * region.size[a] + region.edge.value();
+    const auto index = [&](double at) {
+      const double edges = (at - static_cast<double>(grid.origin[a])) / static_cast<double>(grid.edge);
+      return static_cast<int>(std::clamp(edges, -1.0, static_cast<double>(count[a])));
+    };
+    first[a] = std::max(0, index(region.center[a] - half));
+    last[a] = std::min(count[a] - 1, index(region.center[a] + half) + 1);
+  }
+  for (int k = first[2]; k <= last[2]; ++k)
+    for (int j = first[1]; j <= last[1]; ++j)
+      for (int i = first[0]; i <= last[0]; ++i) act(grid.index(i, j, k), place_of(grid, i, j, k));
 }
 
 recon::CameraResponse relative(recon::CameraResponse response) {
@@ -43,10 +56,10 @@ struct Tint {
   double gain = 1;
 };
 Tint tint_at(const std::vector<ColourStop>& curve, double kelvin) {
-  const auto above =
-      std::find_if(curve.begin(), curve.end(), [&](const ColourStop& s) { return s.kelvin.value() >= kelvin; });
+  const auto above = std::find_if(curve.begin(), curve.end(),
+                                  [&](const ColourStop& s) { return s.kelvin.value() >= kelvin; });
   const ColourStop& high = above == curve.end() ? curve.back() : *above;
-  const ColourStop& low = above == curve.begin() ? high : *(above == curve.end() ? above - 1 : above - 1);
+  const ColourStop& low = above == curve.begin() ? high : *(above - 1);
   const double span = (high.kelvin - low.kelvin).value();
   const double part = span > 0 ? std::clamp((kelvin - low.kelvin.value()) / span, 0.0, 1.0) : 0.0;
   Tint tint;
@@ -68,7 +81,7 @@ void recolour(recon::Volume& volume, const std::vector<float>& kelvin, const Col
 }
 
 void brighten(recon::Volume& volume, const BrightnessEdit& edit) {
-  each_key_point(volume.grid, [&](std::size_t p, const Eigen::Vector3d& place) {
+  each_key_point(volume.grid, edit.region, [&](std::size_t p, const Eigen::Vector3d& place) {
     const double share = share_of(edit.region, place);
     if (!(share > 0)) return;
     const auto factor = static_cast<float>(1 + share * (edit.factor - 1));
@@ -115,10 +128,13 @@ std::vector<std::uint8_t> dark_points(const recon::Grid& grid,
   for (const Operation* operation : operations) {
     const auto* edit = std::get_if<RegionEdit>(operation);
     if (edit == nullptr) continue;
-    each_key_point(grid, [&](std::size_t p, const Eigen::Vector3d& place) {
-      const bool inside = !(distance_to(edit->region, place) > 0);
-      if (inside == (edit->part == Part::cut)) dark[p] = 1;
+    std::vector<std::uint8_t> inside(grid.size());
+    each_key_point(grid, edit->region, [&](std::size_t p, const Eigen::Vector3d& place) {
+      inside[p] = distance_to(edit->region, place) > 0 ? 0 : 1;
     });
+    const std::uint8_t lit = edit->part == Part::cut ? 0 : 1;
+    for (std::size_t p = 0; p < dark.size(); ++p)
+      if (inside[p] != lit) dark[p] = 1;
   }
   return dark;
 }

@@ -42,8 +42,8 @@ Status check_view(const Operation& operation, const recon::Scene& scene) {
   for (const recon::View& v : scene.views)
     if (v.role == recon::ViewRole::input) names += (names.empty() ? "" : ", ") + v.name;
   return Error{ErrorKind::bad_input,
-               fmt::format("\"{}\" {}", *name, held_out ? "is held out" : "is no view of this scene"),
-               "view", "Give one of " + names};
+               fmt::format("\"{}\" {}", *name, held_out ? "is held out" : "is no view of this scene"), "view",
+               "Give one of " + names};
 }
 
 }  // namespace
@@ -78,8 +78,7 @@ Stylization::Stylization(const recon::Scene& scene, const recon::Outcome& from,
   begun_.reconstruction.volume = {};
 }
 
-Result<std::unique_ptr<Stylization>> Stylization::begin(const recon::Scene& scene,
-                                                        const recon::Outcome& from,
+Result<std::unique_ptr<Stylization>> Stylization::begin(const recon::Scene& scene, const recon::Outcome& from,
                                                         const recon::SolveOptions& options, Colours colours,
                                                         const recon::CameraResponse& response) {
   std::unique_ptr<Stylization> begun(new Stylization(scene, from, options, colours, response));

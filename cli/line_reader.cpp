@@ -38,8 +38,6 @@ std::vector<std::string> LineReader::take() {
   return lines;
 }
 
-void LineReader::wait(Seconds longest) const {
-  is_readable(fd_, static_cast<int>(1000 * longest.value()));
-}
+void LineReader::wait(Seconds longest) const { is_readable(fd_, static_cast<int>(1000 * longest.value())); }
 
 }  // namespace emberlock::cli

@@ -14,8 +14,8 @@ class LineReader {
   /// `fd` stays open and belongs to the caller.
   explicit LineReader(int fd) : fd_(fd) {}
 
-  /// The lines that were finished since the last call, without empty ones; the last one may lack its end where
-  /// the input ends. One of more than 64 MiB ends the input.
+  /// The lines that were finished since the last call, without empty ones; the last one may lack its end
+  /// where the input ends. One of more than 64 MiB ends the input.
   std::vector<std::string> take();
   /// Until something arrives, the input ends, or so long.
   void wait(Seconds longest) const;

@@ -112,7 +112,7 @@ class StylizeRun {
   std::size_t view_;
   int end_;               // passes in all, as far as it is known
   std::size_t next_ = 0;  // of the file's steps
-  int taken_ = 0;  // lines
+  int taken_ = 0;         // lines
   std::optional<LineReader> lines_;
 };
 
@@ -141,7 +141,8 @@ Result<std::size_t> view_shown(const StylizeArguments& a, const apply::EditFile&
                                const recon::Scene& scene) {
   std::string name = a.view;
   for (const apply::Step& step : edits.steps)
-    if (const std::string* const of = apply::view_of(step.operation); name.empty() && of != nullptr) name = *of;
+    if (const std::string* const of = apply::view_of(step.operation); name.empty() && of != nullptr)
+      name = *of;
   for (std::size_t v = 0; v < scene.views.size(); ++v)
     if (name.empty() || scene.views[v].name == name) return v;
   return Error{ErrorKind::bad_input, "there is no view \"" + name + "\"", "--view",
@@ -173,13 +174,27 @@ Result<recon::ReconstructOptions> options_with(const StylizeArguments& a, const 
   return options;
 }
 
-Status write(const StylizeArguments& a, apply::Stylization& stylization, OutputFolder& folder) {
+/// The edited pictures, numbered as the views are.
+Status write_edited(const recon::Scene& captured, const recon::Scene& edited, const fs::path& folder) {
+  std::error_code ec;
+  for (std::size_t v = 0; v < edited.views.size(); ++v) {
+    if (edited.views[v].image == captured.views[v].image) continue;
+    fs::create_directory(folder, ec);
+    EMBERLOCK_RETURN_IF_ERROR(recon::write_png(recon::to_rgb8(*edited.views[v].image).view(),
+                                               folder / fmt::format("{:04}.png", v)));
+  }
+  return {};
+}
+
+Status write(const StylizeArguments& a, const recon::Scene& captured, apply::Stylization& stylization,
+             OutputFolder& folder) {
   EMBERLOCK_ASSIGN_OR_RETURN(recon::Outcome outcome, stylization.outcome());
   std::optional<recon::TemperatureField> temperature;
   temperature.swap(outcome.temperature);  // whose errors the page would tell
   const std::string page = report::reconstruct_html(stylization.scene(), outcome);
   temperature.swap(outcome.temperature);
   EMBERLOCK_RETURN_IF_ERROR(recon::write_outcome_files(outcome, folder.path(), page));
+  EMBERLOCK_RETURN_IF_ERROR(write_edited(captured, stylization.scene(), folder.path() / "edited"));
   apply::EditFile record = stylization.record();
   EMBERLOCK_RETURN_IF_ERROR(keep_objects(record, folder.path()));
   EMBERLOCK_RETURN_IF_ERROR(write_file_atomically(folder.path() / "edits.json", apply::to_json(record)));
@@ -209,14 +224,14 @@ Status stylize(const StylizeArguments& a) {
   EMBERLOCK_ASSIGN_OR_RETURN(recon::Outcome begun, recon::reconstruct(scene, options, clock, bar));
   begun.report.input = a.reconstruct.input;
   begun.report.up = report::shown_axes(scene.views).up_axis();
-  EMBERLOCK_ASSIGN_OR_RETURN(const std::unique_ptr<apply::Stylization> stylization,
-                             apply::Stylization::begin(scene, begun, options.solve, edits.colours,
-                                                       recon::response_for({}, scene)));
+  EMBERLOCK_ASSIGN_OR_RETURN(
+      const std::unique_ptr<apply::Stylization> stylization,
+      apply::Stylization::begin(scene, begun, options.solve, edits.colours, recon::response_for({}, scene)));
   EMBERLOCK_ASSIGN_OR_RETURN(OutputFolder folder, OutputFolder::create(request));
   std::error_code ec;
   if (a.previews) fs::create_directory(folder.path() / "previews", ec);
   EMBERLOCK_RETURN_IF_ERROR(StylizeRun(a, edits, *stylization, folder.path(), view).go());
-  return write(a, *stylization, folder);
+  return write(a, scene, *stylization, folder);
 }
 
 }  // namespace
@@ -229,13 +244,14 @@ void add_stylize(CLI::App& app) {
   verb->add_option("SCENE", a.reconstruct.input, "transforms.json, or a recorded session's folder")
       ->required();
   verb->add_option("--out", a.out,
-                   "Folder for what reconstruct writes, the steps as edits.json, and their pictures")
+                   "Folder for what reconstruct writes, the steps as edits.json, and edited pictures")
       ->required();
-  verb->add_option(
-      "--edits", a.edits, "The steps, as apply/edit_file.h describes them, or an edits.json to be replayed");
-  verb->add_flag("--live", a.live,
-                 "Read further steps from stdin, a JSON object a line, that take effect before the next pass; "
-                 "a line of JSON on stdout tells of each pass. Ends after the end of stdin");
+  verb->add_option("--edits", a.edits,
+                   "The steps, as apply/edit_file.h describes them, or an edits.json to be replayed");
+  verb->add_flag(
+      "--live", a.live,
+      "Read further steps from stdin, a JSON object a line, that take effect before the next pass; "
+      "a line of JSON on stdout tells of each pass. Ends after the end of stdin");
   verb->add_option("--passes", a.passes,
                    "After the last step [the file's number in all, or 60]; live: after each")
       ->check(CLI::Range(0, 1000000));
@@ -247,7 +263,8 @@ void add_stylize(CLI::App& app) {
   verb->add_option("--view", a.view, "The view that previews show [the first that is edited]");
   verb->add_option("--rig", a.reconstruct.rig, "Sessions only: rig.json of `calibrate cameras`");
   verb->add_option("--box", a.reconstruct.box, "cx,cy,cz,sx,sy,sz: the volume's centre and size in metres");
-  verb->add_option("--voxels", a.reconstruct.voxels, "Along the longest edge [the edits', or as reconstruct]");
+  verb->add_option("--voxels", a.reconstruct.voxels,
+                   "Along the longest edge [the edits', or as reconstruct]");
   add_solve_options(verb, a.reconstruct);
   add_picture_options(verb, a.reconstruct);
   verb->callback([arguments] {

@@ -14,10 +14,10 @@
 
 namespace emberlock::recon {
 
-/// A reconstruction that goes on, pass by pass, while its pictures are changed: the default solver's passes at
-/// full resolution, from the volume as it is. Nothing is decided anew: effects and smoothness stay what they
-/// were, and so does what the medium absorbs, so that edits move light alone. A function of its calls and
-/// their order: the same bits for every number of threads.
+/// A reconstruction that goes on, pass by pass, while its pictures are changed: the default solver's passes
+/// at full resolution, from the volume as it is. Nothing is decided anew: effects and smoothness stay what
+/// they were, and so does what the medium absorbs, so that edits move light alone. A function of its calls
+/// and their order: the same bits for every number of threads.
 class RunningSolve {
  public:
   /// Goes on behind `from`, a solve of this scene. Errors: the paper's solver, a light or scattering, which
@@ -67,9 +67,9 @@ class RunningSolve {
   SolverSetup setup_;
   std::unique_ptr<Level> level_;
   std::unique_ptr<Descent> descent_;
-  std::vector<float> weights_;       // of the descent, before any was darkened
-  std::vector<std::uint8_t> dark_;   // one a key point of the whole grid; empty: none
-  std::vector<float> aside_;         // emission that was laid aside, as in Volume; empty: none
+  std::vector<float> weights_;      // of the descent, before any was darkened
+  std::vector<std::uint8_t> dark_;  // one a key point of the whole grid; empty: none
+  std::vector<float> aside_;        // emission that was laid aside, as in Volume; empty: none
 };
 
 }  // namespace emberlock::recon

@@ -81,8 +81,7 @@ std::vector<float> TemperatureLookUp::read_green(const std::vector<float>& emiss
   for (std::size_t p = 0; p < out.size(); ++p) {
     const float green = emission[3 * p + 1];
     if (!(green > 0)) continue;
-    const double key =
-        front + std::log(static_cast<double>(hottest)) - std::log(static_cast<double>(green));
+    const double key = front + std::log(static_cast<double>(hottest)) - std::log(static_cast<double>(green));
     out[p] = static_cast<float>(kelvin(std::max(front, key)));
   }
   return out;

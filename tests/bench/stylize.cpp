@@ -3,18 +3,26 @@
 // width. For each kind of edit the median and the longest of nine, and by how much the preview changed where
 // it changed most.
 //   bench_stylize [VOXELS WIDTHxHEIGHT [THREADS]]
+// Or an example to be stylized: a flame, and a teapot with something small inside as all of its views see it.
+//   bench_stylize --example FOLDER
+#include "apply/stylize.h"
+
 #include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
+#include <filesystem>
+#include <functional>
 #include <string>
 #include <vector>
 
 #include <fmt/format.h>
 
-#include "apply/stylize.h"
+#include "base/file.h"
+#include "tests/support/scene_files.h"
 #include "tests/support/stylized_flame.h"
+#include "tests/support/teapot.h"
 
 namespace {
 
@@ -67,12 +75,13 @@ void bench(int voxels, ImageSize image, int threads) {
   const auto run = test::begin_stylization(flame, apply::Colours::flame, threads);
   const std::string& name = flame.scene.views[0].name;
   const double wide = image.width;
-  const auto object = test::write_object(test::folder_for("bench") / "teapot.png", 256, test::teapot_grey);
+  const auto object = test::Teapot({0, 0, 0}).write_seen_by(flame.scene.views[0].camera,
+                                                            test::folder_for("bench") / "teapot.png");
   for (int n = 0; n < 3; ++n) demand(run->pass());
   std::printf("%d voxels, %d x %d, a pass and a preview %.0f ms\n", voxels, image.width, image.height,
               1e3 * seconds([&] {
                 demand(run->pass());
-                run->preview(run->shown(), 0, 320);
+                static_cast<void>(run->preview(run->shown(), 0, 320));
               }));
   const auto at = [&](int n) { return Eigen::Vector2d((0.44 + 0.01 * n) * wide, 0.5 * image.height); };
   const apply::Region ball{apply::Region::Shape::ellipsoid, {0, 0, 0}, {0.05, 0.05, 0.05}, Meters(0.01)};
@@ -88,7 +97,6 @@ void bench(int voxels, ImageSize image, int threads) {
          put.view = name;
          put.file = object;
          put.position = at(n);
-         put.scale = 0.2 * wide / 256;
          return std::vector<Operation>{put};
        }},
       {"light beyond the flame, in all views",
@@ -97,11 +105,8 @@ void bench(int voxels, ImageSize image, int threads) {
          std::vector<Operation> edits;
          for (const recon::View& view : flame.scene.views)
            if (view.role == recon::ViewRole::input)
-             edits.emplace_back(apply::BrushEdit{view.name,
-                                                 {view.camera.project(place)},
-                                                 0.03 * wide,
-                                                 apply::BrushEdit::Mode::add,
-                                                 120});
+             edits.emplace_back(apply::BrushEdit{
+                 view.name, {view.camera.project(place)}, 0.03 * wide, apply::BrushEdit::Mode::add, 120});
          return edits;
        }},
       {"undo", [](int) { return std::vector<Operation>{apply::Undo{}}; }},
@@ -121,9 +126,36 @@ void bench(int voxels, ImageSize image, int threads) {
   for (const Kind& kind : kinds) measure(*run, kind);
 }
 
+/// FOLDER/scene/transforms.json, FOLDER/teapotN.png and FOLDER/edits.json.
+void write_example(const std::filesystem::path& folder) {
+  recon::PaperSceneOptions options;
+  options.image = {480, 360};
+  const recon::Scene scene = recon::paper_scene(options);
+  demand(test::write_scene(scene, folder / "scene"));
+  const test::Teapot teapot({0, 0, -0.02});
+  apply::EditFile edits;
+  edits.voxels = 96;
+  edits.passes = 40;
+  for (std::size_t v = 0; v < scene.views.size(); ++v) {
+    const recon::View& view = scene.views[v];
+    const std::string name = fmt::format("teapot{}.png", v);
+    teapot.write_seen_by(view.camera, folder / name);
+    apply::ObjectEdit put;
+    put.view = fmt::format("view{}.png", v);
+    put.file = name;
+    put.position = {0.5 * options.image.width, 0.5 * options.image.height};
+    edits.steps.push_back({0, put});
+  }
+  demand(write_file_atomically(folder / "edits.json", apply::to_json(edits)));
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
+  if (argc == 3 && std::string(argv[1]) == "--example") {
+    write_example(argv[2]);
+    return 0;
+  }
   const int threads = argc > 3 ? std::atoi(argv[3]) : 2;
   int width = 0;
   int height = 0;

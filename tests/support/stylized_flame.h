@@ -4,11 +4,12 @@
 #include <cmath>
 #include <filesystem>
 #include <memory>
+#include <stdexcept>
 #include <string>
 #include <utility>
 
 #include <fmt/format.h>
-#include <gtest/gtest.h>
+#include <unistd.h>
 
 #include "apply/stylize.h"
 #include "base/clock.h"
@@ -61,21 +62,6 @@ inline std::unique_ptr<apply::Stylization> begin_stylization(
   return std::move(begun).value();
 }
 
-/// A teapot from the side with a bright ball inside of it, shaded as if lit from above: a function of the
-/// place, -1..1 along its width. Black around it.
-inline double teapot_grey(double x, double y) {
-  const auto within = [](double u, double v, double a, double b) { return u * u / (a * a) + v * v / (b * b); };
-  const double ball = within(x, y - 0.08, 0.17, 0.17);
-  if (ball < 1) return 250 * std::sqrt(1 - 0.6 * ball);
-  const double body = within(x, y - 0.08, 0.52, 0.4);
-  const bool lid = within(x, y + 0.36, 0.1, 0.08) < 1;
-  const double handle = within(x + 0.62, y - 0.02, 0.26, 0.26);
-  const bool handles = handle < 1 && handle > 0.45 && x < -0.4;
-  const bool spout = x > 0.4 && x < 0.88 && std::abs(y + 0.75 * (x - 0.62)) < 0.09;
-  if (body < 1) return 150 * std::sqrt(1 - 0.7 * body);
-  return lid || handles || spout ? 130 : 0;
-}
-
 /// A square picture of a function of the place, -1..1 along each side, as 8 bits of grey.
 template <class Grey>
 std::filesystem::path write_object(const std::filesystem::path& file, int edge, const Grey& grey) {
@@ -92,7 +78,8 @@ std::filesystem::path write_object(const std::filesystem::path& file, int edge, 
 
 /// A folder of a test's own.
 inline std::filesystem::path folder_for(const std::string& name) {
-  std::filesystem::path folder = std::filesystem::path(testing::TempDir()) / ("stylize_" + name);
+  std::filesystem::path folder =
+      std::filesystem::temp_directory_path() / fmt::format("stylize_{}_{}", name, ::getpid());
   std::filesystem::remove_all(folder);
   std::filesystem::create_directories(folder);
   return folder;

@@ -67,14 +67,15 @@ TEST(EditFile, SaysWhereItCannotBeUsed) {
       {with_steps(R"({"pass": 0, "op": "brush", "view": "a", "points": [], "radius": 2, "mode": "erase"})"),
        "points"},
       {with_steps(R"({"pass": 0, "op": "brush", "view": "a", "points": [[0, 0]], "radius": 2})"), "strength"},
-      {with_steps(
-           R"({"pass": 0, "op": "mask", "view": "a", "polygon": [[0, 0], [1, 1]], "part": "cut"})"),
+      {with_steps(R"({"pass": 0, "op": "mask", "view": "a", "polygon": [[0, 0], [1, 1]], "part": "cut"})"),
        "polygon"},
-      {with_steps(R"({"pass": 0, "op": "colour", "curve": [{"kelvin": 2000, "colour": [0, 0, 0]}]})"), "black"},
+      {with_steps(R"({"pass": 0, "op": "colour", "curve": [{"kelvin": 2000, "colour": [0, 0, 0]}]})"),
+       "black"},
       {with_steps(
            R"({"pass": 0, "op": "colour", "curve": [{"kelvin": 2000, "colour": [1, 0, 0]}, {"kelvin": 2000, "colour": [1, 0, 0]}]})"),
        "rise"},
-      {with_steps(R"({"pass": 0, "op": "object", "view": "a", "file": "o", "position": [0, 0], "hash": "1"})"),
+      {with_steps(
+           R"({"pass": 0, "op": "object", "view": "a", "file": "o", "position": [0, 0], "hash": "1"})"),
        "hash"}};
   for (const auto& [text, words] : cases) EXPECT_THAT(refusal(text), HasSubstr(words)) << text;
 }

@@ -95,7 +95,8 @@ TEST(ShownVolume, AColourCurveChangesColourAlone) {
     for (std::size_t p = 0; p < kGrid.size(); ++p) {
       EXPECT_NEAR(sum_at(after.volume, p), sum_at(before.volume, p), 1e-5 * sum_at(before.volume, p));
       const double hot = (static_cast<double>(after.kelvin[p]) - 1000) / 1300;
-      EXPECT_NEAR(static_cast<double>(after.volume.emission[3 * p + 2]), hot * sum_at(before.volume, p), 1e-2);
+      EXPECT_NEAR(static_cast<double>(after.volume.emission[3 * p + 2]), hot * sum_at(before.volume, p),
+                  1e-2);
     }
   }
 }

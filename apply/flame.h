@@ -34,12 +34,17 @@ class Flame {
   struct View {
     recon::RayList rays;
     std::vector<std::int32_t> ray_of_pixel;  ///< -1: none
-    std::vector<recon::Rgba> source;         ///< what this camera sees of it, per voxel edge
+    /// What this camera sees of it, per voxel edge, where it depends on the camera; else the flame's own.
+    std::vector<recon::Rgba> source;
   };
   /// `step`: the largest, in voxel edges.
   [[nodiscard]] View seen_by(const recon::CameraModel& camera, double step, recon::Pool& pool) const;
   /// Puts the steps of a pixel's ray into `light`, and ends the flame there.
   void add_steps(const View& view, std::size_t pixel, RayLight& light) const;
+  /// Radiance, grey levels, and in lane 3 the transmittance, of each of the view's rays, by the march of
+  /// render_view(), as far as `until`: metres from the camera, of each pixel; cuts the view's rays there.
+  [[nodiscard]] std::vector<recon::Rgba> marched(View& view, const std::vector<float>& until,
+                                                 recon::Pool& pool) const;
 
   // What surfaces see.
 
@@ -69,10 +74,18 @@ class Flame {
   /// `within`: 0..1 along each of its edges.
   [[nodiscard]] Sent sent(std::uint32_t voxel, const Eigen::Vector3d& within) const;
 
+  /// Of the coarse grid's voxels, metres.
+  [[nodiscard]] double light_edge() const {
+    return static_cast<double>(coarse_.grid.edge) * world_from_flame_.scale;
+  }
+
   /// Around its box in the world.
   [[nodiscard]] Eigen::AlignedBox3d bounds() const;
 
  private:
+  [[nodiscard]] const recon::Rgba* source_of(const View& view) const {
+    return view.source.empty() ? source_.data() : view.source.data();
+  }
   [[nodiscard]] Eigen::Vector3d in_coarse_edges(const Eigen::Vector3d& world) const;
   /// The part of a line (coarse edges) inside of the coarse box, in multiples of `along`; empty: first >
   /// second.

@@ -1,0 +1,189 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "apply/pose_track.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include <Eigen/Dense>
+
+#include "recon/calibrate/chain_poses.h"
+#include "recon/calibrate/pose.h"
+
+namespace emberlock::apply {
+namespace {
+
+using Matrix12 = Eigen::Matrix<double, 12, 12>;
+using Vector12 = Eigen::Matrix<double, 12, 1>;
+
+/// How a twist on the right of a motion looks on its left.
+Eigen::Matrix<double, 6, 6> adjoint(const recon::Rigid3& motion) {
+  Eigen::Matrix<double, 6, 6> matrix = Eigen::Matrix<double, 6, 6>::Zero();
+  matrix.topLeftCorner<3, 3>() = motion.rotation;
+  matrix.bottomRightCorner<3, 3>() = motion.rotation;
+  matrix.topRightCorner<3, 3>() = recon::cross_matrix(motion.translation) * motion.rotation;
+  return matrix;
+}
+
+/// a minus b, as the error's twists.
+Vector12 difference(const MotionState& a, const MotionState& b) {
+  Vector12 d;
+  d.head<6>() = twist_of(recon::chained(a.pose, b.pose.inverse()));
+  d.tail<6>() = a.twist - b.twist;
+  return d;
+}
+
+MotionState moved_by(const MotionState& state, const Vector12& d) {
+  MotionState moved = state;
+  moved.pose = recon::chained(rigid_of(d.head<6>()), state.pose);
+  moved.twist += d.tail<6>();
+  return moved;
+}
+
+Matrix12 inverse_of(const Matrix12& covariance) { return covariance.ldlt().solve(Matrix12::Identity()); }
+
+/// So many squared sigmas are beyond what `points` scatter by.
+double gate(std::size_t points) {
+  const auto values = 2 * static_cast<double>(points);
+  return values + 15 * std::sqrt(2 * values);
+}
+
+}  // namespace
+
+double PoseTrack::variance_of(const MarkerPose& pose) const {
+  return std::pow(std::max(options_.pixel_sigma, pose.rms), 2);
+}
+
+MotionState PoseTrack::started(const std::vector<MarkerPoint>& points, const MarkerPose& pose) const {
+  constexpr double kMetresPerSecond = 1;
+  constexpr double kRadiansPerSecond = 2;
+  MotionState state;
+  state.pose = pose.camera_from_marker;
+  const Residuals seen = residuals(points, lens_, state.pose);
+  state.covariance.topLeftCorner<6, 6>() =
+      variance_of(pose) *
+      (seen.by.transpose() * seen.by).ldlt().solve(Eigen::Matrix<double, 6, 6>::Identity());
+  const double distance = state.pose.translation.norm();
+  for (int a = 0; a < 3; ++a) {
+    state.covariance(6 + a, 6 + a) = std::pow(kMetresPerSecond * distance, 2);
+    state.covariance(9 + a, 9 + a) = std::pow(kRadiansPerSecond, 2);
+  }
+  return state;
+}
+
+void PoseTrack::predict(double dt, TrackStep& step) const {
+  const recon::Rigid3 motion = rigid_of(dt * state_->twist);
+  step.continues = true;
+  step.transition.topLeftCorner<6, 6>() = adjoint(motion);
+  step.transition.topRightCorner<6, 6>() = dt * Eigen::Matrix<double, 6, 6>::Identity();
+  step.predicted = *state_;
+  step.predicted.pose = recon::chained(motion, state_->pose);
+  Matrix12& p = step.predicted.covariance;
+  p = step.transition * state_->covariance * step.transition.transpose();
+  const double squared = state_->pose.translation.squaredNorm();
+  for (int a = 0; a < 6; ++a) {
+    const double density = a < 3 ? options_.move_density * squared : options_.turn_density;
+    p(a, a) += density * dt * dt * dt / 3;
+    p(a, 6 + a) += density * dt * dt / 2;
+    p(6 + a, a) += density * dt * dt / 2;
+    p(6 + a, 6 + a) += density * dt;
+  }
+}
+
+std::optional<PoseTrack::Update> PoseTrack::updated(const MotionState& predicted,
+                                                    const std::vector<MarkerPoint>& points,
+                                                    double variance) const {
+  const Matrix12 prior = inverse_of(predicted.covariance);
+  Update update{predicted};
+  Matrix12 information = prior;
+  for (int round = 0; round < 8; ++round) {
+    const Residuals seen = residuals(points, lens_, update.state.pose);
+    if (!seen.before_camera) return {};
+    information = prior;
+    information.topLeftCorner<6, 6>() += seen.by.transpose() * seen.by / variance;
+    Vector12 slope = -prior * difference(update.state, predicted);
+    slope.head<6>() += seen.by.transpose() * seen.off / variance;
+    const Vector12 step = information.ldlt().solve(slope);
+    if (!step.allFinite()) return {};
+    update.state = moved_by(update.state, step);
+    if (step.norm() < 1e-9) break;
+  }
+  const Residuals seen = residuals(points, lens_, update.state.pose);
+  if (!seen.before_camera) return {};
+  const Vector12 moved = difference(update.state, predicted);
+  update.squares = seen.off.squaredNorm() / variance;
+  update.cost = update.squares + moved.dot(prior * moved);
+  update.state.covariance = inverse_of(information);
+  return update;
+}
+
+TrackStep PoseTrack::see(Seconds time, const std::vector<MarkerPoint>& points) {
+  TrackStep step;
+  if (state_) predict(std::max((time - time_).value(), 1e-6), step);
+  time_ = time;
+  const std::vector<MarkerPose> poses = marker_poses(points, lens_);
+  std::optional<MotionState> known;
+  if (!poses.empty() && state_) {
+    // For another pose speaks what it explains better than the tracked one, by its likelihood (Wald 1945); no
+    // single frame decides.
+    constexpr double kMostOfFrame = 4;
+    const double variance = variance_of(poses.front());
+    const double best = static_cast<double>(points.size()) * std::pow(poses.front().rms, 2) / variance;
+    const auto update = updated(step.predicted, points, variance);
+    const bool fits = update && update->cost < gate(points.size());
+    const double speaks = fits ? (update->squares - best - 12) / 2 : kMostOfFrame;
+    evidence_ = std::max(0.0, evidence_ + std::clamp(speaks, -kMostOfFrame, kMostOfFrame));
+    if (fits) known = update->state;
+  }
+  constexpr double kDecides = 10;
+  if (!poses.empty() && (!state_ || evidence_ > kDecides)) {
+    known = started(points, poses.front());
+    step.continues = false;
+    evidence_ = 0;
+  }
+  lost_ = known ? 0 : lost_ + 1;
+  if (known) {
+    step.seen.from = TrackedPose::From::marker;
+    state_ = known;
+  } else if (state_ && lost_ <= options_.held) {
+    step.seen.from = TrackedPose::From::prediction;
+    state_ = step.predicted;
+  } else {
+    was_hidden_ = was_hidden_ || state_;
+    state_.reset();
+    evidence_ = 0;
+    back_ = 0;
+    step.continues = false;
+    return step;
+  }
+  ++back_;
+  step.known = *state_;
+  step.seen.camera_from_marker = state_->pose;
+  step.seen.shown = was_hidden_ ? std::min(1.0, static_cast<double>(back_) / options_.fade) : 1;
+  if (known) {
+    step.points = points;
+    step.seen.rms = rms_off(points, lens_, state_->pose);
+  }
+  return step;
+}
+
+std::vector<TrackedPose> smooth(std::span<const TrackStep> steps, const recon::Intrinsics& lens) {
+  std::vector<TrackedPose> poses;
+  for (const TrackStep& step : steps) poses.push_back(step.seen);
+  if (steps.empty()) return poses;
+  MotionState later = steps.back().known;
+  for (std::size_t i = steps.size() - 1; i-- > 0;) {
+    const TrackStep& next = steps[i + 1];
+    if (!next.continues) {
+      later = steps[i].known;
+      continue;
+    }
+    const Matrix12 gain =
+        next.predicted.covariance.ldlt().solve(next.transition * steps[i].known.covariance).transpose();
+    later = moved_by(steps[i].known, gain * difference(later, next.predicted));
+    poses[i].camera_from_marker = later.pose;
+    if (!steps[i].points.empty()) poses[i].rms = rms_off(steps[i].points, lens, later.pose);
+  }
+  return poses;
+}
+
+}  // namespace emberlock::apply

@@ -96,7 +96,8 @@ void Composite::look_for_white(const Image& frame, const recon::CameraModel& cam
     const auto rank = static_cast<std::ptrdiff_t>(kRank * static_cast<double>(levels[c].size()));
     std::nth_element(levels[c].begin(), levels[c].begin() + rank, levels[c].end());
     double& white = white_[static_cast<Eigen::Index>(c)];
-    white += share * (static_cast<double>(transfer_.light(levels[c][static_cast<std::size_t>(rank)])) - white);
+    white +=
+        share * (static_cast<double>(transfer_.light(levels[c][static_cast<std::size_t>(rank)])) - white);
   }
 }
 

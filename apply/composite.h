@@ -43,8 +43,8 @@ class Composite {
   Composite(const recon::Intrinsics& lens, const Marker& marker, Transfer::Curve curve,
             const CompositeOptions& options = {});
 
-  /// Draws into an rgb8 frame of the camera's size. `shown`: 0..1, of the flame and its light. Where the light
-  /// on the plate ends the plate ends too: what of the flame lies behind it is seen beyond.
+  /// Draws into an rgb8 frame of the camera's size. `shown`: 0..1, of the flame and its light. Where the
+  /// light on the plate ends the plate ends too: what of the flame lies behind it is seen beyond.
   void draw(const Flame& flame, const PlateLight& light, const recon::Rigid3& camera_from_marker,
             const InFront& front, double shown, Image& frame, recon::Pool& pool);
   /// The level of the marker's white, linear, of the frames drawn last; 0 before the first.

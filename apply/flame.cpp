@@ -145,8 +145,7 @@ void Flame::add_steps(const View& view, std::size_t pixel, RayLight& light) cons
     float reached = run.start * meters;
     auto put = [&](int sample, std::int32_t base, float fx, float fy, float fz) {
       const float to = (run.start + static_cast<float>(sample + 1) * run.step) * meters;
-      steps.push_back(
-          {reached, to, per_meter * recon::trilinear(source + base, row, plane, fx, fy, fz)});
+      steps.push_back({reached, to, per_meter * recon::trilinear(source + base, row, plane, fx, fy, fz)});
       reached = to;
     };
     recon::each_sample<float>(table, recon::StraightPath::line<float>(table, n), run, put);

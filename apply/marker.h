@@ -21,9 +21,9 @@ namespace emberlock::apply {
 /// viewer who stands before it: the origin in its middle, x to the right, y upwards, z out of the plate,
 /// metres.
 struct Marker {
-  std::string dictionary;  ///< by recon::marker_dictionaries()
-  int id = 0;              ///< of the one marker
-  Meters edge{0};          ///< of its black border
+  std::string dictionary;                  ///< by recon::marker_dictionaries()
+  int id = 0;                              ///< of the one marker
+  Meters edge{0};                          ///< of its black border
   std::optional<recon::Board> board = {};  ///< instead of the one marker
 
   /// Width and height of what is printed black on white.

@@ -60,8 +60,8 @@ std::optional<MarkerPose> refined(const std::vector<MarkerPoint>& points, const 
 recon::Rigid3 rigid_of(const Twist& twist) {
   const Eigen::Vector3d omega = twist.tail<3>();
   const double angle = omega.norm();
-  const Eigen::Matrix3d rotation = angle > 0 ? Eigen::AngleAxisd(angle, omega / angle).toRotationMatrix()
-                                             : Eigen::Matrix3d::Identity();
+  const Eigen::Matrix3d rotation =
+      angle > 0 ? Eigen::AngleAxisd(angle, omega / angle).toRotationMatrix() : Eigen::Matrix3d::Identity();
   return {rotation, left_jacobian(omega) * twist.head<3>()};
 }
 

@@ -31,9 +31,9 @@ Twist twist_of(const recon::Rigid3& motion);
 /// How far the points are seen from where a pose puts them, and how that changes with rigid_of(twist) left of
 /// it: two rows a point.
 struct Residuals {
-  Eigen::VectorXd off;                         ///< seen minus projected, pixels
+  Eigen::VectorXd off;                          ///< seen minus projected, pixels
   Eigen::Matrix<double, Eigen::Dynamic, 6> by;  ///< of the projection
-  bool before_camera = true;                   ///< all points are
+  bool before_camera = true;                    ///< all points are
 };
 Residuals residuals(const std::vector<MarkerPoint>& points, const recon::Intrinsics& lens,
                     const recon::Rigid3& camera_from_marker);

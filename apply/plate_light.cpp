@@ -45,8 +45,8 @@ class PlateSum {
     const Eigen::Vector3d towards = sent.place - place;
     if (!(towards.z() > 0)) return Eigen::Vector3d::Zero();
     const double squared = towards.squaredNorm();
-    return towards.z() / (squared * std::sqrt(squared)) *
-           std::exp(-flame_.depth_between(place, sent.place)) * sent.power;
+    return towards.z() / (squared * std::sqrt(squared)) * std::exp(-flame_.depth_between(place, sent.place)) *
+           sent.power;
   }
 
   const Flame& flame_;
@@ -65,7 +65,8 @@ PlateLight::PlateLight(const Flame& flame, double edge, int points, recon::Pool&
   pool.run(points, [&](int row) {
     for (int i = 0; i < points; ++i)
       irradiance_[static_cast<std::size_t>(row) * static_cast<std::size_t>(points) +
-                  static_cast<std::size_t>(i)] = sum.at({i * spacing - edge / 2, row * spacing - edge / 2, 0});
+                  static_cast<std::size_t>(i)] =
+          sum.at({i * spacing - edge / 2, row * spacing - edge / 2, 0});
   });
 }
 

@@ -10,9 +10,9 @@
 
 namespace emberlock::apply {
 
-/// A flame's light on the plate z = 0 around the world's origin: its irradiance (surface_light.h), on a square
-/// of points, without random numbers and so without noise. It is summed over the voxels of the flame's coarse
-/// grid; a voxel that is nearer than four of its edges is taken as 4 x 4 x 4 places.
+/// A flame's light on the plate z = 0 around the world's origin: its irradiance (surface_light.h), on a
+/// square of points, without random numbers and so without noise. It is summed over the voxels of the flame's
+/// coarse grid; a voxel that is nearer than four of its edges is taken as 4 x 4 x 4 places.
 class PlateLight {
  public:
   PlateLight() = default;

@@ -12,12 +12,13 @@
 namespace emberlock::apply {
 namespace {
 
-using Matrix12 = Eigen::Matrix<double, 12, 12>;
-using Vector12 = Eigen::Matrix<double, 12, 1>;
+using Matrix = MotionState::Matrix;
+using Vector = Eigen::Matrix<double, MotionState::kValues, 1>;
+using Matrix6 = Eigen::Matrix<double, 6, 6>;
 
 /// How a twist on the right of a motion looks on its left.
-Eigen::Matrix<double, 6, 6> adjoint(const recon::Rigid3& motion) {
-  Eigen::Matrix<double, 6, 6> matrix = Eigen::Matrix<double, 6, 6>::Zero();
+Matrix6 adjoint(const recon::Rigid3& motion) {
+  Matrix6 matrix = Matrix6::Zero();
   matrix.topLeftCorner<3, 3>() = motion.rotation;
   matrix.bottomRightCorner<3, 3>() = motion.rotation;
   matrix.topRightCorner<3, 3>() = recon::cross_matrix(motion.translation) * motion.rotation;
@@ -25,21 +26,23 @@ Eigen::Matrix<double, 6, 6> adjoint(const recon::Rigid3& motion) {
 }
 
 /// a minus b, as the error's twists.
-Vector12 difference(const MotionState& a, const MotionState& b) {
-  Vector12 d;
+Vector difference(const MotionState& a, const MotionState& b) {
+  Vector d;
   d.head<6>() = twist_of(recon::chained(a.pose, b.pose.inverse()));
-  d.tail<6>() = a.twist - b.twist;
+  d.segment<6>(6) = a.twist - b.twist;
+  d.tail<6>() = a.acceleration - b.acceleration;
   return d;
 }
 
-MotionState moved_by(const MotionState& state, const Vector12& d) {
+MotionState moved_by(const MotionState& state, const Vector& d) {
   MotionState moved = state;
   moved.pose = recon::chained(rigid_of(d.head<6>()), state.pose);
-  moved.twist += d.tail<6>();
+  moved.twist += d.segment<6>(6);
+  moved.acceleration += d.tail<6>();
   return moved;
 }
 
-Matrix12 inverse_of(const Matrix12& covariance) { return covariance.ldlt().solve(Matrix12::Identity()); }
+Matrix inverse_of(const Matrix& covariance) { return covariance.ldlt().solve(Matrix::Identity()); }
 
 /// So many squared sigmas are beyond what `points` scatter by.
 double gate(std::size_t points) {
@@ -49,67 +52,89 @@ double gate(std::size_t points) {
 
 }  // namespace
 
-double PoseTrack::variance_of(const MarkerPose& pose) const {
-  return std::pow(std::max(options_.pixel_sigma, pose.rms), 2);
+/// Of a coordinate: what frames so far left over when each was explained on its own, at least; more of a
+/// frame that leaves over far more.
+double PoseTrack::variance_of(const MarkerPose& pose, std::size_t points) {
+  const auto n = static_cast<double>(points);
+  const double own = pose.rms * pose.rms * n / (2 * n - 6);  // a pose takes up six of the 2 n values
+  constexpr double kFollows = 0.05;
+  constexpr double kFar = 9;
+  noise_ += kFollows * (std::min(own, kFar * noise_) - noise_);
+  const double least = options_.least_sigma * options_.least_sigma;
+  return std::max({least, noise_, own / kFar});
 }
 
-MotionState PoseTrack::started(const std::vector<MarkerPoint>& points, const MarkerPose& pose) const {
+MotionState PoseTrack::started(const std::vector<MarkerPoint>& points, const MarkerPose& pose,
+                               double variance) const {
   constexpr double kMetresPerSecond = 1;
   constexpr double kRadiansPerSecond = 2;
   MotionState state;
   state.pose = pose.camera_from_marker;
   const Residuals seen = residuals(points, lens_, state.pose);
   state.covariance.topLeftCorner<6, 6>() =
-      variance_of(pose) *
-      (seen.by.transpose() * seen.by).ldlt().solve(Eigen::Matrix<double, 6, 6>::Identity());
+      variance * (seen.by.transpose() * seen.by).ldlt().solve(Matrix6::Identity());
   const double distance = state.pose.translation.norm();
-  for (int a = 0; a < 3; ++a) {
-    state.covariance(6 + a, 6 + a) = std::pow(kMetresPerSecond * distance, 2);
-    state.covariance(9 + a, 9 + a) = std::pow(kRadiansPerSecond, 2);
+  for (int a = 0; a < 6; ++a) {
+    const double speed = a < 3 ? kMetresPerSecond * distance : kRadiansPerSecond;
+    const double usual = a < 3 ? options_.move_acceleration * distance : options_.turn_acceleration;
+    state.covariance(6 + a, 6 + a) = speed * speed;
+    state.covariance(12 + a, 12 + a) = usual * usual;
   }
   return state;
 }
 
 void PoseTrack::predict(double dt, TrackStep& step) const {
-  const recon::Rigid3 motion = rigid_of(dt * state_->twist);
+  const double lasts = options_.lasts.value();
+  const double stays = std::exp(-dt / lasts);
+  const double adds_twist = lasts * (1 - stays);
+  const double adds_pose = lasts * (dt - adds_twist);
+  const recon::Rigid3 motion = rigid_of(dt * state_->twist + adds_pose * state_->acceleration);
   step.continues = true;
   step.transition.topLeftCorner<6, 6>() = adjoint(motion);
-  step.transition.topRightCorner<6, 6>() = dt * Eigen::Matrix<double, 6, 6>::Identity();
+  step.transition.block<6, 6>(0, 6) = dt * Matrix6::Identity();
+  step.transition.block<6, 6>(0, 12) = adds_pose * Matrix6::Identity();
+  step.transition.block<6, 6>(6, 12) = adds_twist * Matrix6::Identity();
+  step.transition.block<6, 6>(12, 12) = stays * Matrix6::Identity();
   step.predicted = *state_;
   step.predicted.pose = recon::chained(motion, state_->pose);
-  Matrix12& p = step.predicted.covariance;
+  step.predicted.twist += adds_twist * state_->acceleration;
+  step.predicted.acceleration *= stays;
+  Matrix& p = step.predicted.covariance;
   p = step.transition * state_->covariance * step.transition.transpose();
-  const double squared = state_->pose.translation.squaredNorm();
+  // White noise of the acceleration's rate of change, over a step that is short beside what accelerations
+  // last.
+  const double powers[3][3] = {{std::pow(dt, 5) / 20, std::pow(dt, 4) / 8, std::pow(dt, 3) / 6},
+                               {std::pow(dt, 4) / 8, std::pow(dt, 3) / 3, dt * dt / 2},
+                               {std::pow(dt, 3) / 6, dt * dt / 2, dt}};
+  const double distance = state_->pose.translation.norm();
   for (int a = 0; a < 6; ++a) {
-    const double density = a < 3 ? options_.move_density * squared : options_.turn_density;
-    p(a, a) += density * dt * dt * dt / 3;
-    p(a, 6 + a) += density * dt * dt / 2;
-    p(6 + a, a) += density * dt * dt / 2;
-    p(6 + a, 6 + a) += density * dt;
+    const double usual = a < 3 ? options_.move_acceleration * distance : options_.turn_acceleration;
+    for (int i = 0; i < 3; ++i)
+      for (int j = 0; j < 3; ++j) p(6 * i + a, 6 * j + a) += 2 * usual * usual / lasts * powers[i][j];
   }
 }
 
 std::optional<PoseTrack::Update> PoseTrack::updated(const MotionState& predicted,
                                                     const std::vector<MarkerPoint>& points,
                                                     double variance) const {
-  const Matrix12 prior = inverse_of(predicted.covariance);
+  const Matrix prior = inverse_of(predicted.covariance);
   Update update{predicted};
-  Matrix12 information = prior;
+  Matrix information = prior;
   for (int round = 0; round < 8; ++round) {
     const Residuals seen = residuals(points, lens_, update.state.pose);
     if (!seen.before_camera) return {};
     information = prior;
     information.topLeftCorner<6, 6>() += seen.by.transpose() * seen.by / variance;
-    Vector12 slope = -prior * difference(update.state, predicted);
+    Vector slope = -prior * difference(update.state, predicted);
     slope.head<6>() += seen.by.transpose() * seen.off / variance;
-    const Vector12 step = information.ldlt().solve(slope);
+    const Vector step = information.ldlt().solve(slope);
     if (!step.allFinite()) return {};
     update.state = moved_by(update.state, step);
     if (step.norm() < 1e-9) break;
   }
   const Residuals seen = residuals(points, lens_, update.state.pose);
   if (!seen.before_camera) return {};
-  const Vector12 moved = difference(update.state, predicted);
+  const Vector moved = difference(update.state, predicted);
   update.squares = seen.off.squaredNorm() / variance;
   update.cost = update.squares + moved.dot(prior * moved);
   update.state.covariance = inverse_of(information);
@@ -121,12 +146,12 @@ TrackStep PoseTrack::see(Seconds time, const std::vector<MarkerPoint>& points) {
   if (state_) predict(std::max((time - time_).value(), 1e-6), step);
   time_ = time;
   const std::vector<MarkerPose> poses = marker_poses(points, lens_);
+  const double variance = poses.empty() ? 0 : variance_of(poses.front(), points.size());
   std::optional<MotionState> known;
   if (!poses.empty() && state_) {
     // For another pose speaks what it explains better than the tracked one, by its likelihood (Wald 1945); no
     // single frame decides.
     constexpr double kMostOfFrame = 4;
-    const double variance = variance_of(poses.front());
     const double best = static_cast<double>(points.size()) * std::pow(poses.front().rms, 2) / variance;
     const auto update = updated(step.predicted, points, variance);
     const bool fits = update && update->cost < gate(points.size());
@@ -136,7 +161,7 @@ TrackStep PoseTrack::see(Seconds time, const std::vector<MarkerPoint>& points) {
   }
   constexpr double kDecides = 10;
   if (!poses.empty() && (!state_ || evidence_ > kDecides)) {
-    known = started(points, poses.front());
+    known = started(points, poses.front(), variance);
     step.continues = false;
     evidence_ = 0;
   }
@@ -177,7 +202,7 @@ std::vector<TrackedPose> smooth(std::span<const TrackStep> steps, const recon::I
       later = steps[i].known;
       continue;
     }
-    const Matrix12 gain =
+    const Matrix gain =
         next.predicted.covariance.ldlt().solve(next.transition * steps[i].known.covariance).transpose();
     later = moved_by(steps[i].known, gain * difference(later, next.predicted));
     poses[i].camera_from_marker = later.pose;

@@ -13,18 +13,20 @@
 
 namespace emberlock::apply {
 
-// The motion of a camera before a marker: a constant twist in the camera's axes, disturbed by white
-// accelerations (Bar-Shalom, Li and Kirubarajan 2001, "Estimation with applications to tracking and
-// navigation", section 6.2.2), on the Lie group SE(3). A pose T goes to exp(dt xi) T; its error is a twist
-// left of it. What is measured are the pixels of the marker's points: an iterated extended Kalman filter (Bell
-// and Cathey 1993), whose update is the most probable pose given the pixels and the prediction. So the
-// prediction also tells which of a flat marker's two poses it is.
+// The motion of a camera before a marker: twists in the camera's axes whose accelerations fade over time
+// (Singer 1970, "Estimating optimal tracking filter performance for manned maneuvering targets"), on the Lie
+// group SE(3). A pose T goes to exp(dt xi + ...) T; its error is a twist left of it. What is measured are the
+// pixels of the marker's points: an iterated extended Kalman filter (Bell and Cathey 1993), whose update is
+// the most probable pose given the pixels and the prediction. So the prediction also tells which of a flat
+// marker's two poses it is.
 
 struct TrackOptions {
-  double pixel_sigma = 0.15;  ///< of a point, pixels; more where a frame's own residual says so
-  /// Densities of the accelerations: of moves, (m/s2)2/Hz, per metre of distance to the marker squared; of
-  /// turns, (rad/s2)2/Hz. As a camera is moved by hand.
-  double move_density = 0.3, turn_density = 0.3;
+  /// Noise of a point's coordinates, pixels: at first, and at least; it is measured as frames come.
+  double pixel_sigma = 0.15, least_sigma = 0.05;
+  /// What accelerations are usual, as a camera is moved by hand: of moves, m/s2 per metre of distance to the
+  /// marker; of turns, rad/s2; and for how long they last.
+  double move_acceleration = 0.4, turn_acceleration = 0.4;
+  Seconds lasts{0.8};
   int held = 5;  ///< lost frames that the motion is trusted for
   int fade = 6;  ///< frames in which the flame comes back after it was hidden
 };
@@ -38,32 +40,36 @@ struct TrackedPose {
   double shown = 0;  ///< 0..1: of the flame
 };
 
-/// What the filter knows: a pose, its twist, and the covariance of both.
+/// What the filter knows: a pose, its twist and that one's acceleration, and the covariance of all three.
 struct MotionState {
+  static constexpr int kValues = 18;
+  using Matrix = Eigen::Matrix<double, kValues, kValues>;
+
   recon::Rigid3 pose;
-  Twist twist = Twist::Zero();
-  Eigen::Matrix<double, 12, 12> covariance = Eigen::Matrix<double, 12, 12>::Zero();
+  Twist twist = Twist::Zero(), acceleration = Twist::Zero();
+  Matrix covariance = Matrix::Zero();
 };
 
 /// One step of a PoseTrack, for smooth().
 struct TrackStep {
   TrackedPose seen;
   std::vector<MarkerPoint> points;  ///< where they told the pose
-  bool continues = false;  ///< the step before, through `transition`
+  bool continues = false;           ///< the step before, through `transition`
   MotionState predicted, known;
-  Eigen::Matrix<double, 12, 12> transition = Eigen::Matrix<double, 12, 12>::Identity();
+  MotionState::Matrix transition = MotionState::Matrix::Identity();
 };
 
 /// Poses as frames come.
 class PoseTrack {
  public:
   explicit PoseTrack(recon::Intrinsics lens, const TrackOptions& options = {})
-      : lens_(std::move(lens)), options_(options) {}
+      : lens_(std::move(lens)), options_(options), noise_(options.pixel_sigma * options.pixel_sigma) {}
   /// The next frame, later than the one before; `points` is empty where the marker isn't seen.
   TrackStep see(Seconds time, const std::vector<MarkerPoint>& points);
 
  private:
-  [[nodiscard]] MotionState started(const std::vector<MarkerPoint>& points, const MarkerPose& pose) const;
+  [[nodiscard]] MotionState started(const std::vector<MarkerPoint>& points, const MarkerPose& pose,
+                                    double variance) const;
   void predict(double dt, TrackStep& step) const;
   struct Update {
     MotionState state;
@@ -71,16 +77,16 @@ class PoseTrack {
     double squares = 0;  ///< of the pixels
   };
   [[nodiscard]] std::optional<Update> updated(const MotionState& predicted,
-                                              const std::vector<MarkerPoint>& points,
-                                              double variance) const;
-  [[nodiscard]] double variance_of(const MarkerPose& pose) const;
+                                              const std::vector<MarkerPoint>& points, double variance) const;
+  double variance_of(const MarkerPose& pose, std::size_t points);
 
   recon::Intrinsics lens_;
   TrackOptions options_;
+  double noise_;  ///< variance of a coordinate, pixels squared
   std::optional<MotionState> state_;
   Seconds time_{0};
-  int lost_ = 0;          ///< frames since the marker was seen
-  double evidence_ = 0;   ///< for another pose than the tracked one
+  int lost_ = 0;         ///< frames since the marker was seen
+  double evidence_ = 0;  ///< for another pose than the tracked one
   bool was_hidden_ = false;
   int back_ = 0;  ///< frames since the flame came back
 };

@@ -70,8 +70,9 @@ std::optional<double> crossing(const Brightness& picture, const Eigen::Vector2d&
   std::array<double, kMost + 1> level{};
   for (int i = -half; i <= half; ++i)
     level[static_cast<std::size_t>(i + half)] = picture.at(place + i * kStep * outwards);
-  const auto mean = [&](int from) { return (level[static_cast<std::size_t>(from)] +
-                                            level[static_cast<std::size_t>(from + 1)]) / 2; };
+  const auto mean = [&](int from) {
+    return (level[static_cast<std::size_t>(from)] + level[static_cast<std::size_t>(from + 1)]) / 2;
+  };
   const double dark = mean(0);
   const double bright = mean(2 * half - 1);
   if (!(bright > dark)) return {};
@@ -259,7 +260,8 @@ std::vector<SeenMarker> find_markers(const ImageView& picture, const std::string
   for (std::size_t m = 0; m < ids.size(); ++m) {
     SeenMarker marker{ids[m], {}};
     for (std::size_t c = 0; c < 4; ++c)
-      marker.corners[c] = {static_cast<double>(quads[m][c].x) + 0.5, static_cast<double>(quads[m][c].y) + 0.5};
+      marker.corners[c] = {static_cast<double>(quads[m][c].x) + 0.5,
+                           static_cast<double>(quads[m][c].y) + 0.5};
     meet_sides(brightness, undistorted, known->markerSize + 2, marker);
     markers.push_back(marker);
   }

@@ -34,8 +34,7 @@ int markers_in(const std::string& dictionary);
 /// straight where the lens's distortion is removed. `light`, if given, is the light of each of 256 grey
 /// levels, by which "half way" is meant; else levels are proportional to light.
 std::vector<SeenMarker> find_markers(const ImageView& picture, const std::string& dictionary,
-                                     const Intrinsics& lens,
-                                     const std::array<float, 256>* light = nullptr);
+                                     const Intrinsics& lens, const std::array<float, 256>* light = nullptr);
 
 /// Draws a marker, `cell` pixels per cell of its pattern, with a white margin of one cell.
 Image draw_marker(const std::string& dictionary, int id, int cell);

@@ -69,7 +69,8 @@ class Plate {
                            static_cast<std::uint64_t>(x);
         for (int c = 0; c < 3; ++c) {
           const double noise =
-              look.noise > 0 ? look.noise * random_normal(look.seed, pixel, static_cast<std::uint64_t>(c)) : 0;
+              look.noise > 0 ? look.noise * random_normal(look.seed, pixel, static_cast<std::uint64_t>(c))
+                             : 0;
           image.row_as<std::uint8_t>(y)[3 * x + c] =
               static_cast<std::uint8_t>(std::lround(std::clamp(level + noise, 0.0, 255.0)));
         }
@@ -94,8 +95,7 @@ class Plate {
     const double x = p.x() / pixel_ + size.width / 2.0;
     const double y = -p.y() / pixel_ + size.height / 2.0;
     if (!(x >= 0 && y >= 0 && x < size.width && y < size.height)) return look.table;
-    const bool white =
-        print_.view().row_as<std::uint8_t>(static_cast<int>(y))[static_cast<int>(x)] > 127;
+    const bool white = print_.view().row_as<std::uint8_t>(static_cast<int>(y))[static_cast<int>(x)] > 127;
     return white ? look.paper : look.ink;
   }
   [[nodiscard]] double mean_light(const recon::CameraModel& camera, const recon::Rigid3& marker_from_camera,
@@ -114,9 +114,8 @@ class Plate {
     double sum = 0;
     for (int j = 0; j < look.samples; ++j)
       for (int i = 0; i < look.samples; ++i) {
-        const Eigen::Vector3d d =
-            marker_from_camera.rotation *
-            (first + (i + 0.5) / look.samples * right + (j + 0.5) / look.samples * down);
+        const Eigen::Vector3d d = marker_from_camera.rotation * (first + (i + 0.5) / look.samples * right +
+                                                                 (j + 0.5) / look.samples * down);
         const Eigen::Vector3d& o = marker_from_camera.translation;
         sum += light_at(o - o.z() / d.z() * d, look);
       }

@@ -156,7 +156,7 @@ TEST_F(CompositeTest, ASparkLightsThePlateByInverseSquareAndCosine) {
   const Flame light = flame(spark(8e6F), moved(0, 0, kHeight));
   const double power = 8e6 * 1e-6;
   const recon::CameraModel camera = before_plate(small_lens(), {0.05, -0.3, 0.25}, {0.02, 0.02, 0});
-  const Image seen = drawn(light, camera, even(100), {}, 4);
+  const Image seen = drawn(light, camera, even(100), {}, 2);
   for (int y = 0; y < 72; y += 5)
     for (int x = 0; x < 96; x += 5) {
       const recon::Ray ray = camera.ray({x + 0.5, y + 0.5});

@@ -7,6 +7,7 @@
 
 #include "recon/kernels/in_scatter.h"
 #include "recon/render/cropped_source.h"
+#include "recon/render/march_table.h"
 #include "recon/render/scattered_source.h"
 
 namespace emberlock::apply {
@@ -27,6 +28,59 @@ Affine affine(const Eigen::Matrix3d& linear, const Eigen::Vector3d& offset) {
     to.m[4 * r + 3] = static_cast<float>(offset[r]);
   }
   return to;
+}
+
+/// The pixels that may see a grid's box: those around its edges, which a lens bends; all of them where a part
+/// of it isn't before the camera, or lies where the lens may fold its picture over.
+recon::PixelBox pixels_around(const recon::CameraModel& camera, const recon::Grid& grid) {
+  const ImageSize size = camera.intrinsics.size;
+  const recon::PixelBox all{0, 0, size.width, size.height};
+  constexpr int kAlong = 8;
+  constexpr double kMargin = 4;  // pixels that an edge may bend between two of its places
+  const recon::Box box = recon::box_of(grid);
+  double widest = 0;  // tangent of the angle from the axis, squared
+  for (int corner = 0; corner < 4; ++corner) {
+    const Eigen::Vector2d pixel((corner & 1) * size.width, (corner >> 1) * size.height);
+    const Eigen::Vector3d ray = recon::CameraModel{camera.intrinsics, {}}.ray(pixel).direction;
+    widest = std::max(widest, ray.head<2>().squaredNorm() / (ray.z() * ray.z()));
+  }
+  Eigen::AlignedBox2d seen;
+  for (int edge = 0; edge < 12; ++edge)
+    for (int i = 0; i <= kAlong; ++i) {
+      const int axis = edge / 4;
+      Eigen::Vector3d side;
+      side[axis] = static_cast<double>(i) / kAlong - 0.5;
+      side[(axis + 1) % 3] = (edge & 1) - 0.5;
+      side[(axis + 2) % 3] = (edge >> 1 & 1) - 0.5;
+      const Eigen::Vector3d place = box.center + side.cwiseProduct(box.size);
+      const Eigen::Vector3d there = camera.camera_from_world * place;
+      if (!(there.z() > 1e-3 * static_cast<double>(grid.edge))) return all;
+      if (!camera.intrinsics.distortion.none() &&
+          there.head<2>().squaredNorm() > widest * there.z() * there.z())
+        return all;
+      seen.extend(camera.project(place));
+    }
+  const auto bound = [](double v, int limit) {
+    return static_cast<int>(std::clamp(v, 0.0, static_cast<double>(limit)));
+  };
+  return {bound(seen.min().x() - kMargin, size.width), bound(seen.min().y() - kMargin, size.height),
+          bound(seen.max().x() + kMargin, size.width), bound(seen.max().y() + kMargin, size.height)};
+}
+
+/// Ends a ray's runs at a distance, voxel edges.
+void end_ray(recon::RayList& list, std::size_t ray, float until) {
+  recon::MarchRay& r = list.rays[ray];
+  for (std::uint32_t n = 0; n < r.runs; ++n) {
+    recon::Run& run = list.runs[r.first_run + n];
+    if (run.start + static_cast<float>(run.count) * run.step <= until) continue;
+    const float left = until - run.start;
+    r.runs = left > 0 ? n + 1 : n;
+    if (left > 0) {
+      run.count = std::max(1, static_cast<int>(std::ceil(left / run.step)));
+      run.step = left / static_cast<float>(run.count);
+    }
+    return;
+  }
 }
 
 }  // namespace
@@ -75,11 +129,34 @@ Flame::View Flame::seen_by(const recon::CameraModel& camera, double step, recon:
   }
   recon::RayListOptions options;
   options.step = static_cast<float>(step);
+  options.boxes = {pixels_around(beside, crop_.hull.grid)};
   if (!here) options.home = recon::RayListOptions::Home::where_it_is_made;
   view.rays = recon::clip_rays({&beside}, crop_.hull, options, pool);
   for (std::size_t r = 0; here && r < view.rays.pixels.size(); ++r)
     view.ray_of_pixel[view.rays.pixels[r]] = static_cast<std::int32_t>(r);
   return view;
+}
+
+std::vector<recon::Rgba> Flame::marched(View& view, const std::vector<float>& until,
+                                        recon::Pool& pool) const {
+  recon::RayList& list = view.rays;
+  std::vector<recon::Rgba> seen(list.rays.size());
+  const double edge = static_cast<double>(crop_.hull.grid.edge) * world_from_flame_.scale;
+  recon::MarchWork<float> work;
+  work.rays = list.table();
+  work.volume = view.source->data();
+  work.residual = seen.data();
+  const auto absorb = effects_.extinction.model == recon::Extinction::Model::field ? recon::Absorb::field
+                                                                                   : recon::Absorb::nothing;
+  const auto forward = recon::march_table<float>().forward_of(absorb, recon::Travel::straight);
+  constexpr int kTasks = 64;
+  pool.run(kTasks, [&](int task) {
+    const recon::Slice mine = recon::slice(list.rays.size(), kTasks, task);
+    for (std::size_t r = mine.begin; r < mine.end; ++r)
+      end_ray(list, r, static_cast<float>(static_cast<double>(until[list.pixels[r]]) / edge));
+    forward(work, mine.begin, mine.end);
+  });
+  return seen;
 }
 
 FlameTable Flame::table() const {
@@ -112,7 +189,7 @@ std::vector<Flame::Emitter> Flame::glowing() const {
   std::vector<Emitter> all;
   if (medium_.count == 0) return all;
   const recon::Grid& g = coarse_.grid;
-  const double edge = static_cast<double>(g.edge) * world_from_flame_.scale;
+  const double edge = light_edge();
   for (int k = 0; k < g.nz - 1; ++k)
     for (int j = 0; j < g.ny - 1; ++j)
       for (int i = 0; i < g.nx - 1; ++i) {

@@ -55,6 +55,11 @@ class Flame {
   };
   /// `step`: the largest, in voxel edges.
   [[nodiscard]] View seen_by(const recon::CameraModel& camera, double step, recon::Pool& pool) const;
+  /// Radiance, grey levels, and in lane 3 the transmittance, of each of the view's rays, by the march of
+  /// render_view(), as far as `until`: metres from the camera, of each pixel; cuts the view's rays there. The
+  /// view's rays must be in the CPU's memory.
+  [[nodiscard]] std::vector<recon::Rgba> marched(View& view, const std::vector<float>& until,
+                                                 recon::Pool& pool) const;
   /// What kernels need of it: of what surfaces see alone, and with a camera's view, which must outlive it.
   [[nodiscard]] FlameTable table() const;
   [[nodiscard]] FlameTable table(const View& view) const;
@@ -66,6 +71,11 @@ class Flame {
     double power;
   };
   [[nodiscard]] const std::vector<Emitter>& emitters() const { return emitters_; }
+
+  /// Of the coarse grid's voxels, metres.
+  [[nodiscard]] double light_edge() const {
+    return static_cast<double>(coarse_.grid.edge) * world_from_flame_.scale;
+  }
 
   /// Around its box in the world.
   [[nodiscard]] Eigen::AlignedBox3d bounds() const;

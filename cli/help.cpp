@@ -35,7 +35,8 @@ const std::vector<VerbGroup>& verb_groups() {
       {"Cameras", {"devices", "smear", "calibrate"}},
       {"Films of other cameras", {"verify", "import"}},
       {"Volumes",
-       {"reconstruct", "view", "render", "scene", "stylize", "export", "measure", "tradeoff", "evaluate"}}};
+       {"reconstruct", "view", "render", "scene", "ar", "stylize", "export", "measure", "tradeoff",
+        "evaluate"}}};
   return groups;
 }
 

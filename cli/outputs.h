@@ -20,6 +20,7 @@ inline constexpr OutputVerb kMeasure{"measure"};
 inline constexpr OutputVerb kRender{"render"};
 inline constexpr OutputVerb kScene{"scene"};
 inline constexpr OutputVerb kStylize{"stylize"};
+inline constexpr OutputVerb kAr{"ar"};
 inline constexpr OutputVerb kExport{"export"};
 inline constexpr OutputVerb kVerify{"verify"};
 inline constexpr OutputVerb kDemo{"demo"};

@@ -76,7 +76,8 @@ struct Teapot {
       }
     return picture;
   }
-  std::filesystem::path write_seen_by(const recon::CameraModel& camera, const std::filesystem::path& file) const {
+  std::filesystem::path write_seen_by(const recon::CameraModel& camera,
+                                      const std::filesystem::path& file) const {
     const Status written = recon::write_png(seen_by(camera).view(), file);
     if (!written) throw std::runtime_error(written.error().message());
     return file;

@@ -10,15 +10,13 @@ export interface ColourLook {
   mode: 'colour';
   gain: number;
 }
-/** A quantity from `low` on in the palette's colours from `darkest` (0..1) on; `depth`: what it takes of the light along the volume's
- *  longest edge (optical depth), at its highest, or `even` wherever it is told. Isotherms are at `levels`, which rise. */
+/** A quantity from `low` on in the palette's colours; `depth`: what it takes of the light along the volume's longest edge (optical
+ *  depth) where the palette is opaque. Isotherms are at `levels`, which rise. */
 export interface QuantityLook {
   mode: 'quantity';
   low: number;
   high: number;
   depth: number;
-  darkest: number;
-  even?: boolean;
   levels: readonly number[];
 }
 export type Look = ColourLook | QuantityLook;
@@ -94,10 +92,10 @@ export class March {
     texture(kPalette, gl.TEXTURE_2D, gl.LINEAR);
   }
 
-  /** The colours of a quantity, from its lowest to its highest: red, green and blue, 0..255. */
+  /** The colours of a quantity, from its lowest to its highest: red, green, blue and opacity of 256 values, 0..255. */
   setPalette(palette: readonly (readonly number[])[]): void {
     const {gl} = this;
-    const bytes = Uint8Array.from(palette.flatMap(([red, green, blue]) => [red!, green!, blue!, 255]));
+    const bytes = Uint8Array.from(palette.flat());
     gl.activeTexture(gl.TEXTURE0 + kPalette);
     gl.texImage2D(gl.TEXTURE_2D, 0, gl.RGBA8, palette.length, 1, 0, gl.RGBA, gl.UNSIGNED_BYTE, bytes);
   }
@@ -172,8 +170,7 @@ export class March {
     if (look.mode === 'colour') gl.uniform4f(at('range'), look.gain, 0, 0, 0);
     else {
       const [low, high] = [look.low / this.unit, look.high / this.unit];
-      gl.uniform1f(at('even'), look.even ? 1 : 0);
-      gl.uniform4f(at('range'), low, Math.max(high, low + 1e-6), look.depth / Math.max(...grid.points), look.darkest);
+      gl.uniform4f(at('range'), low, Math.max(high, low + 1e-6), look.depth / Math.max(...grid.points), 0);
       gl.uniform4f(at('levels'), ...([0, 1, 2, 3].map(n => (look.levels[n] ?? 1e30) / this.unit) as [number, number, number, number]));
     }
     gl.viewport(0, 0, width, height);

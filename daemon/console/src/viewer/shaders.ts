@@ -9,7 +9,7 @@ const kHead = `#version 300 es
 precision highp float; precision highp sampler3D; precision highp usampler3D; precision highp int;
 uniform sampler3D values;
 uniform usampler3D emptiness;   // bricks to the next that isn't empty; 0 in such ones
-uniform sampler2D colours;
+uniform sampler2D colours;      // of 256 values, in alpha their opacity
 uniform vec3 points;
 uniform ivec3 bricks;
 uniform vec3 eye;
@@ -18,8 +18,7 @@ uniform vec4 lens;              // focal lengths, principal point
 uniform float rows;             // of the picture
 uniform float stride;           // voxel edges
 uniform vec4 scale;             // what the values are times
-uniform vec4 range;             // low, high, depth of the whole volume, colours' darkest
-uniform float even;             // 1: as opaque wherever it is told
+uniform vec4 range;             // low, high, depth of the whole volume
 uniform vec4 levels;            // isotherms, rising; those that aren't used lie beyond all values
 out vec4 colour;
 const float kThrough = 1. / 512., UNTOLD = -1e30;
@@ -35,6 +34,7 @@ interface Steps {
 
 const kMarch = ({begin, sample, stopped, leapt, end}: Steps) => `${kHead}
 vec4 at(vec3 p) { return texture(values, (p + .5) / points); }
+vec4 hueOf(float share) { return texture(colours, vec2((255. * clamp(share, 0., 1.) + .5) / 256., .5)); }
 float told(vec4 v) { return v.y > .02 ? v.x / v.y : UNTOLD; }
 int bandOf(float value) { return value == UNTOLD ? -1 : int(dot(step(levels, vec4(value)), vec4(1))); }
 void main() {
@@ -82,7 +82,7 @@ export const kColour = (absorbs: boolean) => kMarch({begin: '', stopped: '', lea
       light += stretch * scale.rgb * at(p).rgb;`, end: `
   colour = vec4(light * range.x / 255., through);`});
 
-/** A quantity in colours, as opaque as it is high: x holds it times y, which is 1 where it is told, so that what isn't told doesn't
+/** A quantity in colours and as opaque as the palette has it: x holds it times y, which is 1 where it is told, so that what isn't told doesn't
  *  mix in. Isotherms are surfaces: a run of samples stops where it leaves its band of values. */
 export const kQuantity = (surfaces: boolean) => kMarch({begin: surfaces ? `
   float past = UNTOLD, value = UNTOLD, least = -2e30, most = -1e29;  // of the present band, which is that of what isn't told
@@ -92,8 +92,9 @@ export const kQuantity = (surfaces: boolean) => kMarch({begin: surfaces ? `
       value = told(v);
       float share = (value - range.x) / (range.y - range.x);
       if (share > 0.) {
-        float opaque = 1. - exp(-range.z * v.y * mix(min(share, 1.), 1., even) * stretch);
-        light += through * opaque * texture(colours, vec2(mix(range.w, 1., min(share, 1.)), .5)).rgb;
+        vec4 hue = hueOf(share);
+        float opaque = 1. - exp(-range.z * v.y * hue.a * stretch);
+        light += through * opaque * hue.rgb;
         through *= 1. - opaque;
       }
       ${surfaces ? 'stop = value < least || value >= most;' : ''}`, stopped: surfaces ? `
@@ -110,8 +111,7 @@ export const kQuantity = (surfaces: boolean) => kMarch({begin: surfaces ? `
             vec3 f = vec3(a.x, b.x, c.x) / max(vec3(a.y, b.y, c.y), .02), apart = f - f.yzx;
             facing = abs(along) * inversesqrt(along * along + 2. / 9. * dot(apart, apart) + 1e-30);
           }
-          float share = clamp((level - range.x) / (range.y - range.x), 0., 1.);
-          light += through * .7 * (.35 + .65 * facing) * texture(colours, vec2(mix(range.w, 1., share), .5)).rgb;
+          light += through * .7 * (.35 + .65 * facing) * hueOf((level - range.x) / (range.y - range.x)).rgb;
           through *= .3;
         }
         least = band < 0 ? -2e30 : band == 0 ? -1e29 : levels[band - 1];

@@ -30,13 +30,16 @@ export class VolumeView {
   private readonly canvas = el('canvas');
   private readonly stage = new Stage(this.canvas, new Orbit([0, 0, 0], [0, 0, 1], 1));
   private size = '';
+  private shown?: Parameters<VolumeView['show']>;
 
   constructor(container: HTMLElement) {
     container.append(this.canvas);
+    this.stage.renewed = () => { if (this.shown) this.show(...this.shown); };
   }
 
   /** Its brightness, grey or as a flame glows, through red and orange to nearly white; or what is `measured`, as opaque as it is bright. */
   show(header: Volume, bytes: Uint8Array, grey: boolean, measured?: Uint8Array): void {
+    this.shown = [header, bytes, grey, measured];
     const {nx, ny, nz} = header;
     const many = nx * ny * nz;
     if (bytes.length !== many * (1 + (header.layers ?? []).length)) throw new Error(`a volume of ${nx} x ${ny} x ${nz} voxels with ${bytes.length} bytes`);

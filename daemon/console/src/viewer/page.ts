@@ -110,6 +110,9 @@ export class ResultPage {
 
   /** The first picture is there when this is done. */
   async start(): Promise<void> {
+    void this.reader.get(0).catch(() => undefined);  // meanwhile; load() tells what is wrong
+    await this.stage.chosen;
+    this.stage.renewed = () => void this.load(false);
     await this.load(true);
   }
 

@@ -10,16 +10,17 @@ precision highp float; precision highp sampler3D; precision highp usampler3D; pr
 uniform sampler3D values;
 uniform usampler3D emptiness;   // bricks to the next that isn't empty; 0 in such ones
 uniform sampler2D colours;      // of 256 values, in alpha their opacity
-uniform vec3 points;
-uniform ivec3 bricks;
-uniform vec3 eye;
-uniform mat3 axes;              // right, down, forward
-uniform vec4 lens;              // focal lengths, principal point
-uniform float rows;             // of the picture
-uniform float stride;           // voxel edges
-uniform vec4 scale;             // what the values are times
-uniform vec4 range;             // low, high, depth of the whole volume
-uniform vec4 levels;            // isotherms, rising; those that aren't used lie beyond all values
+uniform vec4 told[TOLD];        // March.asTold()
+#define eye told[0].xyz
+#define rows told[0].w
+#define axes mat3(told[1].xyz, told[2].xyz, told[3].xyz)
+#define stride told[1].w
+#define lens told[4]
+#define points told[5].xyz
+#define bricks ivec3(told[6].xyz)
+#define scale told[7]
+#define range told[8]
+#define levels told[9]
 out vec4 colour;
 const float kThrough = 1. / 512., UNTOLD = -1e30;
 `;
@@ -35,7 +36,7 @@ interface Steps {
 const kMarch = ({begin, sample, stopped, leapt, end}: Steps) => `${kHead}
 vec4 at(vec3 p) { return texture(values, (p + .5) / points); }
 vec4 hueOf(float share) { return texture(colours, vec2((255. * clamp(share, 0., 1.) + .5) / 256., .5)); }
-float told(vec4 v) { return v.y > .02 ? v.x / v.y : UNTOLD; }
+float quotient(vec4 v) { return v.y > .02 ? v.x / v.y : UNTOLD; }
 int bandOf(float value) { return value == UNTOLD ? -1 : int(dot(step(levels, vec4(value)), vec4(1))); }
 void main() {
   vec2 pixel = (vec2(gl_FragCoord.x, rows - gl_FragCoord.y) - lens.zw) / lens.xy;
@@ -73,7 +74,7 @@ void main() {
 }`;
 
 /** dL = S ds and the extinction in w, as recon's march: L += T S ds phi(x), T *= exp(-x) with x = sigma ds, phi(x) = (1 - exp(-x)) / x. */
-export const kColour = (absorbs: boolean) => kMarch({begin: '', stopped: '', leapt: '', sample: absorbs ? `
+const kColour = (absorbs: boolean) => kMarch({begin: '', stopped: '', leapt: '', sample: absorbs ? `
       vec4 v = scale * at(p);
       float depth = v.w * stretch;
       float taken = depth < .03 ? depth * (1. - depth * (.5 - depth / 6.)) : 1. - exp(-depth);
@@ -84,12 +85,12 @@ export const kColour = (absorbs: boolean) => kMarch({begin: '', stopped: '', lea
 
 /** A quantity in colours and as opaque as the palette has it: x holds it times y, which is 1 where it is told, so that what isn't told doesn't
  *  mix in. Isotherms are surfaces: a run of samples stops where it leaves its band of values. */
-export const kQuantity = (surfaces: boolean) => kMarch({begin: surfaces ? `
+const kQuantity = (surfaces: boolean) => kMarch({begin: surfaces ? `
   float past = UNTOLD, value = UNTOLD, least = -2e30, most = -1e29;  // of the present band, which is that of what isn't told
-  vec3 aside = normalize(cross(way, axes[1])), athwart = cross(way, aside);` : 'float past = UNTOLD, value = UNTOLD;', sample: `
+  vec3 aside = normalize(cross(way, told[2].xyz)), athwart = cross(way, aside);` : 'float past = UNTOLD, value = UNTOLD;', sample: `
       vec4 v = at(p);
       past = value;
-      value = told(v);
+      value = quotient(v);
       float share = (value - range.x) / (range.y - range.x);
       if (share > 0.) {
         vec4 hue = hueOf(share);
@@ -117,8 +118,20 @@ export const kQuantity = (surfaces: boolean) => kMarch({begin: surfaces ? `
         least = band < 0 ? -2e30 : band == 0 ? -1e29 : levels[band - 1];
         most = band < 0 ? -1e29 : band < 4 ? levels[band] : 1e30;
         empty = band <= 0;
-      }` : '', leapt: surfaces ? 'value = told(at(start + float(n - 1) * over));' : '', end: `
+      }` : '', leapt: surfaces ? 'value = quotient(at(start + float(n - 1) * over));' : '', end: `
   colour = vec4(light, through);`});
+
+export const kFragments = {light: kColour(false), absorbed: kColour(true), quantity: kQuantity(false), surfaces: kQuantity(true)};
+
+/** What another renderer drew, its first row on top: light, and how much comes through. */
+export const kLaid = `#version 300 es
+precision highp float;
+uniform sampler2D light, through;
+out vec4 colour;
+void main() {
+  ivec2 spot = ivec2(gl_FragCoord.x, float(textureSize(light, 0).y) - gl_FragCoord.y);
+  colour = vec4(texelFetch(light, spot, 0).rgb, texelFetch(through, spot, 0).r);
+}`;
 
 /** Cameras in space: their pictures, and the lines of their pyramids. */
 export const kPlaced = `#version 300 es

@@ -58,20 +58,20 @@ ${blocks.map(block => `<script type="application/octet-stream" class="emberlock-
 }
 
 /** Opens a page from the disk and waits for its first picture; what the browser complains of, and what is asked of any server, is kept. */
-export async function openFile(browser: Browser, path: string, size = {width: 1280, height: 900}): Promise<{page: Page; complaints: string[]}> {
+export async function openFile(browser: Browser, path: string, search = '', size = {width: 1280, height: 900}): Promise<{page: Page; complaints: string[]}> {
   const page = await (await browser.newContext({viewport: size, acceptDownloads: true})).newPage();
   const complaints: string[] = [];
   page.on('pageerror', error => complaints.push(`script: ${error.message}`));
   page.on('console', message => { if (message.type() === 'error') complaints.push(message.text()); });
   page.on('request', request => { if (!/^(file|data|blob):/.test(request.url())) complaints.push(`asks elsewhere: ${request.url()}`); });
-  await page.goto(pathToFileURL(path).href);
+  await page.goto(pathToFileURL(path).href + search);
   await page.waitForFunction(() => 'emberlockViewer' in window || document.querySelector('.fault:not([hidden])') !== null, undefined, {timeout: 60_000});
   return {page, complaints};
 }
 
-export async function openMade(browser: Browser, path: string, volumes: readonly Made[], more: Partial<Contents> = {}): Promise<{page: Page; complaints: string[]}> {
+export async function openMade(browser: Browser, path: string, volumes: readonly Made[], more: Partial<Contents> = {}, search = ''): Promise<{page: Page; complaints: string[]}> {
   writeFileSync(path, htmlOf(volumes, more));
-  return openFile(browser, path);
+  return openFile(browser, path, search);
 }
 
 /** A value at every key point, by its place from -1 to 1 on each axis. */

@@ -7,6 +7,7 @@ import {type Channel, decode, inflated, type Triple} from '../../../daemon/conso
 import {cross, dot, eyeOf, Orbit, placeOf, seen} from '../../../daemon/console/src/viewer/eye';
 import {usualRange} from '../../../daemon/console/src/viewer/quantities';
 import {words} from '../../../daemon/console/src/viewer/slices';
+import {histogram, type Knot, moved, opacityAt} from '../../../daemon/console/src/viewer/transfer';
 import {packed} from '../support/viewer_page';
 
 const points: Triple = [11, 19, 9];
@@ -111,4 +112,13 @@ test('few stray values don’t set the colours, and words have the digits that m
   expect(usualRange(new Float32Array(4))).toEqual([0, 1]);
   expect([words(1873.4, 'K'), words(12.345, 'K'), words(0.01234, '1/m'), words(0, 'K')]).toEqual(['1873 K', '12.3 K', '0.0123 1/m', '0 K']);
   expect([...difference(Uint8ClampedArray.from([10, 0, 200, 255]), Uint8ClampedArray.from([0, 5, 20, 255]), 4)]).toEqual([40, 20, 255, 255]);
+});
+
+test('a curve of opacity goes straight from knot to knot, which keep their order, and all values in range are counted', () => {
+  const knots: Knot[] = [[0, 0.25], [0.5, 1], [0.5, 0], [1, 0.5]];
+  expect([0, 0.25, 0.5, 0.75, 1].map(x => opacityAt(knots, x))).toEqual([0.25, 0.625, 1, 0.25, 0.5]);
+  expect(moved(knots, 1, [0.9, 2])[1]).toEqual([0.5, 1]);
+  expect(moved(knots, 1, [-1, 0.5])[1]).toEqual([0, 0.5]);
+  expect([moved(knots, 0, [0.3, 0])[0], moved(knots, 3, [0.3, 0])[3]]).toEqual([[0, 0], [1, 0]]);
+  expect(histogram(Float32Array.from([0, 1, 1.4, 2, 3, 3.1, NaN]), 1, 3, 2)).toEqual([2, 2]);
 });

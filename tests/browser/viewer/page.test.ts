@@ -192,6 +192,36 @@ test('temperatures have a bar in K, isotherms are surfaces and lines, and the po
   await page.context().close();
 });
 
+test('a curve says how opaque each value is, by pointer and by keys', async () => {
+  const {page, complaints} = await open([flame(33)]);
+  await choose(page, 'temperature');
+  const before = await lit(page);
+  expect(before).toBeGreaterThan(1000);
+  const knots = page.locator('.transfer circle');
+  expect(await knots.count()).toBe(2);
+  expect(await page.locator('.transfer .counts').getAttribute('d'), 'the values are counted').toMatch(/V0\.0H/);
+  // Nothing but what is hot: opaque from two thirds on.
+  const box = (await page.locator('.transfer').boundingBox())!;
+  await page.mouse.move(box.x + box.width * 0.66, box.y + box.height * 0.3);
+  await page.mouse.down();
+  await page.mouse.move(box.x + box.width * 0.66, box.y + box.height, {steps: 3});
+  await page.mouse.up();
+  expect(await knots.count()).toBe(3);
+  const hot = await until(() => lit(page), count => count < 0.8 * before, 'what is colder is gone');
+  expect(hot).toBeGreaterThan(100);
+  await screenshot(page, 'viewer-curve');
+  await knots.nth(1).press('ArrowUp');
+  expect(await knots.nth(1).getAttribute('aria-valuetext')).toBe('5 %');
+  await until(() => lit(page), count => count > hot, 'a little of it is back');
+  await knots.nth(1).press('Delete');
+  await knots.nth(0).press('Insert');
+  expect(await knots.count()).toBe(3);
+  await page.getByRole('button', {name: 'Straight'}).click();
+  await until(() => lit(page), count => count === before, 'as in the beginning');
+  expect(complaints).toEqual([]);
+  await page.context().close();
+});
+
 test('the frames of a sequence are gone through, and keep what is chosen', async () => {
   const {page, complaints} = await open([4, 5, 7].map(frame => ({...flame(17 + frame), frame})));
   const label = page.locator('.player .label');

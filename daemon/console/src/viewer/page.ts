@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The page of `emberlock view`: a result's volumes, cameras and errors. Needs no server.
 import {el, set, setText, show} from '../dom';
-import {heat} from '../layers';
 import {Plot} from '../plot';
 import {Compare} from './compare';
 import {type Contents, type Frame, readFrame, type Triple, type Values} from './contents';
@@ -75,7 +74,6 @@ export class ResultPage {
     this.reader = new Reader(contents.frames, block);
     this.orbit = new Orbit(middle, contents.up, reach);
     this.stage = new Stage(this.canvas, this.orbit);
-    this.stage.march.setPalette(Array.from({length: 256}, (_, value) => heat(value)));
     this.root = el('main', {class: 'viewer'});
     this.build(reach);
   }
@@ -112,6 +110,9 @@ export class ResultPage {
 
   /** The first picture is there when this is done. */
   async start(): Promise<void> {
+    void this.reader.get(0).catch(() => undefined);  // meanwhile; load() tells what is wrong
+    await this.stage.chosen;
+    this.stage.renewed = () => void this.load(false);
     await this.load(true);
   }
 
@@ -147,6 +148,8 @@ export class ResultPage {
     if (!this.sliced) return;
     const {frame, values, unit} = this.sliced;
     const [low, high] = this.quantities.range;
+    this.quantities.transfer.show(values, low, high);
+    this.stage.march.setPalette(this.quantities.transfer.palette);
     const levels = this.quantities.chosen === 'emission' ? [] : this.quantities.levels;
     this.slices.show({grid: frame, values, unit, low, high, levels});
   }

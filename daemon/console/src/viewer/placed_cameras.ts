@@ -2,7 +2,7 @@
 // The cameras that filmed, in space: a pyramid of lines each, with its picture at the base.
 import type {FilmingCamera, Triple} from './contents';
 import {add, dot, type Eye, placeOf, seen} from './eye';
-import {linked} from './march';
+import {linked} from './march_gl';
 import {kLines, kPicture, kPlaced} from './shaders';
 
 interface Placed {

@@ -15,7 +15,7 @@ namespace emberlock::apply {
 inline constexpr int kMostFlames = 64;  ///< of a scene
 
 /// A part of a ray, metres; lanes 0..2 the source, grey levels per metre, lane 3 the extinction, 1/m.
-struct Step {
+struct RayStep {
   float from, to;
   recon::Rgba shine;
 };
@@ -129,7 +129,7 @@ struct FineSteps {
     const recon::MarchRay& r = flame.rays.rays[ray];
     return {&flame, r.first_run, r.first_run + r.runs, 0, 0};
   }
-  HOST_DEVICE inline bool next(Step& step) {
+  HOST_DEVICE inline bool next(RayStep& step) {
     if (run == end) return false;
     const recon::RayTable& table = flame->rays;
     const recon::Run& r = table.runs[run];
@@ -187,7 +187,7 @@ struct CoarseSteps {
     all.step = (leaves - all.enters) / static_cast<float>(all.steps);
     return all;
   }
-  HOST_DEVICE inline bool next(Step& to) {
+  HOST_DEVICE inline bool next(RayStep& to) {
     if (sample == steps) return false;
     const float t = enters + (static_cast<float>(sample) + 0.5F) * step;
     to.from = enters + static_cast<float>(sample) * step;

@@ -22,11 +22,11 @@ HOST_DEVICE inline recon::Rgba light_behind(const recon::Rgba& before, const rec
 
 /// What flames do to the light along one ray, several of them merged by distance: each is a row of steps with
 /// constant values, from near to far without overlaps; where those of several flames overlap, their emission
-/// and their extinction add up. `Steps` has next(Step&), which says whether there was another one.
+/// and their extinction add up. `Steps` has next(RayStep&), which says whether there was another one.
 template <class Steps, int kMost>
 struct MergedLight {
   Steps steps[kMost];
-  Step now[kMost];
+  RayStep now[kMost];
   int count = 0;
 
   HOST_DEVICE inline void add(const Steps& flame) {

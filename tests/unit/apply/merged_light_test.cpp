@@ -11,15 +11,15 @@ namespace {
 
 /// A row of steps that is told one by one.
 struct Row {
-  std::vector<Step> steps;
+  std::vector<RayStep> steps;
   std::size_t at = 0;
-  bool next(Step& step) {
+  bool next(RayStep& step) {
     if (at == steps.size()) return false;
     step = steps[at++];
     return true;
   }
 };
-Step shining(float from, float to, float source, float sigma) {
+RayStep shining(float from, float to, float source, float sigma) {
   return {from, to, recon::Rgba{{source, 2 * source, 0, sigma}}};
 }
 recon::Rgba up_to(const std::vector<Row>& flames, float distance) {

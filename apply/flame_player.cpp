@@ -39,8 +39,7 @@ Result<FlamePlayer> FlamePlayer::load(const StandingFlame& standing, recon::Pool
   if (box.isEmpty())
     return Error{ErrorKind::bad_input, "nothing glows in it", player.files_[0].string(),
                  "Name another result of `reconstruct`"};
-  place.translation =
-      standing.foot - Eigen::Vector3d(box.center().x(), box.center().y(), box.min().z());
+  place.translation = standing.foot - Eigen::Vector3d(box.center().x(), box.center().y(), box.min().z());
   player.bounds_ = around(first.volume, place);
   const auto shown = player.at(standing.placed.shift, pool);
   if (!shown) return shown.error();
@@ -59,8 +58,7 @@ Result<const FlamePlayer::Shown*> FlamePlayer::at(Seconds time, recon::Pool& poo
   auto shown = std::make_shared<Shown>();
   shown->flame = std::make_unique<const Flame>(std::move(volume), standing_.placed.world_from_flame,
                                                standing_.placed.brightness, standing_.light_voxels, pool);
-  if (standing_.plate > 0)
-    shown->light = PlateLight(*shown->flame, standing_.plate, kLightPoints, pool);
+  if (standing_.plate > 0) shown->light = PlateLight(*shown->flame, standing_.plate, kLightPoints, pool);
   kept_.push_front({*frame, std::move(shown)});
   if (kept_.size() > kKept) kept_.pop_back();
   return kept_.front().shown.get();

@@ -19,9 +19,9 @@ namespace emberlock::apply {
 
 /// How a result stands on a plate.
 struct StandingFlame {
-  PlacedResult placed;  ///< its rotation and scale; its translation doesn't count
+  PlacedResult placed;                             ///< its rotation and scale; its translation doesn't count
   Eigen::Vector3d foot = Eigen::Vector3d::Zero();  ///< where the middle of what glows touches from above
-  double plate = 0;     ///< edge of the square that it lights, metres
+  double plate = 0;                                ///< edge of the square that it lights, metres
   int light_voxels = 16;
 };
 

@@ -86,9 +86,10 @@ Result<recon::Intrinsics> lens_of(const ArArguments& a, ImageSize size) {
                                recon::camera_model_of(lens, size, camera.camera_id(), a.rig));
     return model.intrinsics;
   }
-  return Error{ErrorKind::bad_input,
-               a.camera.empty() ? "it isn't told which of the rig's cameras filmed" : "the rig has no such camera",
-               a.camera.empty() ? a.rig : "--camera " + a.camera, "Give --camera, one of " + all};
+  return Error{
+      ErrorKind::bad_input,
+      a.camera.empty() ? "it isn't told which of the rig's cameras filmed" : "the rig has no such camera",
+      a.camera.empty() ? a.rig : "--camera " + a.camera, "Give --camera, one of " + all};
 }
 
 Eigen::Matrix3d turned(const std::array<double, 3>& degrees) {
@@ -108,8 +109,7 @@ Result<apply::StandingFlame> standing(const ArArguments& a, const apply::Marker&
   EMBERLOCK_ASSIGN_OR_RETURN(const Eigen::Vector3d up, up_axis(a.up, a.result));
   flame.placed.result = a.result;
   flame.placed.world_from_flame.rotation =
-      turned(degrees) *
-      Eigen::Quaterniond::FromTwoVectors(up, Eigen::Vector3d::UnitZ()).toRotationMatrix();
+      turned(degrees) * Eigen::Quaterniond::FromTwoVectors(up, Eigen::Vector3d::UnitZ()).toRotationMatrix();
   flame.placed.world_from_flame.scale = a.scale;
   flame.placed.brightness = a.brightness;
   flame.placed.rate = Hertz(a.sequence_rate);
@@ -132,9 +132,7 @@ class EvenFrames {
   }
 
  private:
-  [[nodiscard]] long at(std::size_t frame) const {
-    return std::lround(times_[frame].value() * format_.rate);
-  }
+  [[nodiscard]] long at(std::size_t frame) const { return std::lround(times_[frame].value() * format_.rate); }
   const FrameFormat& format_;
   const std::vector<Seconds>& times_;
 };
@@ -160,6 +158,8 @@ Status draw_frames(const ArArguments& a, ArFilm& film, const ArPoses& poses, Dra
     EMBERLOCK_ASSIGN_OR_RETURN(const apply::FlamePlayer::Shown* shown,
                                drawing.flame.at(film.times()[f], drawing.pool));
     const apply::TrackedPose& pose = poses.frames[f];
+    if (pose.from == apply::TrackedPose::From::marker)
+      drawing.composite.take_white(frame, pose.camera_from_marker);
     if (shown != nullptr && pose.from != apply::TrackedPose::From::nothing)
       drawing.composite.draw(*shown->flame, shown->light, pose.camera_from_marker, front, pose.shown, frame,
                              drawing.pool);
@@ -223,13 +223,13 @@ Status draw_ar(ArArguments a, bool rate_told) try {
                              find_poses(film, marker, lens, apply::Transfer(curve).lights()));
   EMBERLOCK_RETURN_IF_ERROR(film.rewind());
   EMBERLOCK_ASSIGN_OR_RETURN(OutputFolder folder, OutputFolder::create(request));
-  EMBERLOCK_ASSIGN_OR_RETURN(FrameFiles files, FrameFiles::create(a.format, folder.path(), "ar", film.size()));
+  EMBERLOCK_ASSIGN_OR_RETURN(FrameFiles files,
+                             FrameFiles::create(a.format, folder.path(), "ar", film.size()));
   apply::Composite composite(lens, marker, curve, {a.albedo, a.step});
   EMBERLOCK_RETURN_IF_ERROR(draw_frames(a, film, poses, {player, composite, front, pool}, files));
   EMBERLOCK_RETURN_IF_ERROR(write_poses(folder.path() / "poses.json", film, marker, lens, poses));
   EMBERLOCK_RETURN_IF_ERROR(folder.commit());
-  print_done(a, film, poses,
-             std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count());
+  print_done(a, film, poses, std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count());
   return {};
 } catch (const std::bad_alloc&) {
   return Error{ErrorKind::bad_input, "not enough memory", a.film, "Give a smaller or shorter video"};
@@ -244,7 +244,8 @@ void add_placement(CLI::App& verb, ArArguments& a) {
   verb.add_option("--rotation", a.rotation, "x,y,z (degrees): around these axes, one after the other")
       ->type_name("TEXT")
       ->capture_default_str();
-  verb.add_option("--up", a.up, "The result's axis that points out of the marker [as the cameras stood, or z]")
+  verb.add_option("--up", a.up,
+                  "The result's axis that points out of the marker [as the cameras stood, or z]")
       ->type_name("TEXT");
   verb.add_option("--scale", a.scale, "Of the flame's lengths")
       ->check(CLI::Range(1e-3, 1e3))
@@ -284,14 +285,16 @@ void add_ar(CLI::App& app) {
   verb->add_option("RESULT", a.result,
                    "Folder of reconstruct, a volume.vdb, or a folder of reconstruct --frames")
       ->required();
-  verb->add_option("--out", a.out, "Folder for ar.mp4 or frame-0000.png and so on, and poses.json")->required();
+  verb->add_option("--out", a.out, "Folder for ar.mp4 or frame-0000.png and so on, and poses.json")
+      ->required();
   verb->add_option("--marker", a.marker,
                    "aruco:4X4_50:0:80mm (dictionary, number, edge of the black border), or "
                    "charuco:5x4:30mm:22mm:4X4_50 (squares)")
       ->required();
   verb->add_option("--rig", a.rig, "The camera's calibration: rig.json, OpenCV's YAML, COLMAP's folder");
   verb->add_option("--camera", a.camera, "Which of the calibration's cameras filmed");
-  verb->add_option("--focal", a.focal, "Instead of --rig: focal length in pixels, of a lens that bends nothing");
+  verb->add_option("--focal", a.focal,
+                   "Instead of --rig: focal length in pixels, of a lens that bends nothing");
   add_placement(*verb, a);
   add_front(*verb, a);
   verb->add_flag("--linear", a.linear, "The frames' levels are in proportion to light; else sRGB");

@@ -47,9 +47,9 @@ class ArFilm {
   std::size_t at_ = 0;
 };
 
-/// Films with a camera that is connected, or one of emberlockd's configuration (`config` not empty), which may
-/// be virtual or recorded too. Errors: bad_input (no such camera), those of the camera, refused (more than
-/// 4 GB).
+/// Films with a camera that is connected, or one of emberlockd's configuration (`config` not empty), which
+/// may be virtual or recorded too. Errors: bad_input (no such camera), those of the camera, refused (more
+/// than 4 GB).
 Result<ArFilm> film_camera(const std::string& camera, const std::filesystem::path& config, Seconds seconds);
 
 }  // namespace emberlock::cli

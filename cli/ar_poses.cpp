@@ -125,8 +125,7 @@ Status write_poses(const std::filesystem::path& path, const ArFilm& film, const 
                          {"predicted", poses.count(From::prediction)},
                          {"without", poses.count(From::nothing)},
                          {"frames", std::move(frames)}};
-  return write_file_atomically(path,
-                               all.dump(1, ' ', false, ordered_json::error_handler_t::replace) + "\n");
+  return write_file_atomically(path, all.dump(1, ' ', false, ordered_json::error_handler_t::replace) + "\n");
 }
 
 }  // namespace emberlock::cli

@@ -21,8 +21,8 @@ struct ArPoses {
   [[nodiscard]] double rms() const;
 };
 
-/// Looks through the whole film. Errors: those of ArFilm::next(); bad_input where the marker is in none of its
-/// frames: the error says which markers there are instead, as far as the first frames show any.
+/// Looks through the whole film. Errors: those of ArFilm::next(); bad_input where the marker is in none of
+/// its frames: the error says which markers there are instead, as far as the first frames show any.
 Result<ArPoses> find_poses(ArFilm& film, const apply::Marker& marker, const recon::Intrinsics& lens,
                            const std::array<float, 256>& light);
 

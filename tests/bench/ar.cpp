@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 // Writes what to time `emberlock ar` with, and measures its poses: a film of a marker that a hand holds a
-// camera before, with truth, 640 x 480, with noise, five lost frames every three seconds, and a flame of 128^3
-// voxels.
-//   bench_ar FOLDER [FRAMES]: FOLDER/film.mp4 (H.264 as players take it), lossless.mkv, blurred.mp4, rig.json,
+// camera before, with truth, 640 x 480, with noise, five lost frames every three seconds, and a flame of
+// 128^3 voxels.
+//   bench_ar FOLDER [FRAMES]: FOLDER/film.mp4 (H.264 as players take it), lossless.mkv, blurred.mp4,
+//   rig.json,
 //     flame/ and truth.json
 //   bench_ar --judge FOLDER OUT: how far OUT/poses.json is from FOLDER/truth.json
 #include <algorithm>
@@ -19,6 +20,7 @@
 #include <nlohmann/json.hpp>
 #include <opencv2/imgproc.hpp>
 
+#include "apply/transfer.h"
 #include "recon/calibrate/rig.h"
 #include "recon/export/volume_file.h"
 #include "recon/hull/hull.h"
@@ -47,11 +49,17 @@ bool write_flame(const fs::path& folder) {
   return recon::write_volume(recon::Flame(options).at(Seconds(0), grid).volume, folder / "volume.vdb").ok();
 }
 
+/// By a lens: light is blurred, not levels.
 Image blurred(const Image& sharp, double sigma) {
+  const apply::Transfer transfer(apply::Transfer::Curve::srgb);
+  cv::Mat light(480, 640, CV_32FC3);
+  auto* values = light.ptr<float>();
+  for (std::size_t i = 0; i < sharp.bytes().size(); ++i)
+    values[i] = transfer.light(static_cast<std::uint8_t>(sharp.bytes()[i]));
+  cv::GaussianBlur(light, light, {}, sigma);
   Image image = sharp;
-  const cv::Mat from(480, 640, CV_8UC3, const_cast<std::byte*>(sharp.bytes().data()));
-  cv::Mat to(480, 640, CV_8UC3, image.bytes().data());
-  cv::GaussianBlur(from, to, {}, sigma);
+  for (std::size_t i = 0; i < image.bytes().size(); ++i)
+    image.bytes()[i] = static_cast<std::byte>(transfer.level(values[i]));
   return image;
 }
 
@@ -63,7 +71,8 @@ int write_films(const fs::path& folder, int frames) {
   using Coding = session::VideoWriter::Coding;
   auto film = session::VideoWriter::create(folder / "film.mp4", layout, Hertz(kRate));
   auto soft = session::VideoWriter::create(folder / "blurred.mp4", layout, Hertz(kRate));
-  auto exact = session::VideoWriter::create(folder / "lossless.mkv", layout, Hertz(kRate), 0, Coding::lossless);
+  auto exact =
+      session::VideoWriter::create(folder / "lossless.mkv", layout, Hertz(kRate), 0, Coding::lossless);
   if (!film || !soft || !exact) return 1;
   nlohmann::json truth = nlohmann::json::array();
   for (int f = 0; f < frames; ++f) {
@@ -108,7 +117,8 @@ int judge(const fs::path& folder, const fs::path& out) {
     for (int r = 0; r < 3; ++r)
       for (int c = 0; c < 4; ++c) {
         const double t = truth[f][static_cast<std::size_t>(4 * r + c)];
-        const double p = frame["camera_from_marker"][static_cast<std::size_t>(r)][static_cast<std::size_t>(c)];
+        const double p =
+            frame["camera_from_marker"][static_cast<std::size_t>(r)][static_cast<std::size_t>(c)];
         (c < 3 ? camera.camera_from_world.rotation(r, c) : camera.camera_from_world.translation[r]) = t;
         (c < 3 ? pose.rotation(r, c) : pose.translation[r]) = p;
       }
@@ -122,9 +132,10 @@ int judge(const fs::path& folder, const fs::path& out) {
     squares += off * off;
     ++count;
   }
-  std::printf("%d poses; corners off the truth: %.3f px (RMS), %.3f px at most, %.3f px in lost frames; "
-              "the flame's foot jumps %.3f px at most\n",
-              count, std::sqrt(squares / std::max(count, 1)), worst, worst_lost, jump);
+  std::printf(
+      "%d poses; corners off the truth: %.3f px (RMS), %.3f px at most, %.3f px in lost frames; "
+      "the flame's foot jumps %.3f px at most\n",
+      count, std::sqrt(squares / std::max(count, 1)), worst, worst_lost, jump);
   return 0;
 }
 

@@ -70,7 +70,8 @@ Composite::Composite(const recon::Intrinsics& lens, const Marker& marker, Transf
     }
 }
 
-void Composite::look_for_white(const Image& frame, const recon::CameraModel& camera) {
+void Composite::take_white(const Image& frame, const recon::Rigid3& camera_from_marker) {
+  const recon::CameraModel camera{lens_, camera_from_marker};
   constexpr int kAcross = 40;
   constexpr double kMargin = 1.16;  // half a cell of the white around the marker
   constexpr double kRank = 0.85;    // more than a tenth of what is looked at is white, and some of it glares
@@ -90,7 +91,7 @@ void Composite::look_for_white(const Image& frame, const recon::CameraModel& cam
       for (std::size_t c = 0; c < 3; ++c) levels[c].push_back(p[c]);
     }
   if (levels[0].size() < kAcross) return;
-  constexpr double kFollows = 0.1;  // of what a frame differs: exposure changes slowly
+  constexpr double kFollows = 0.1;  // of what a frame differs
   const double share = white_.isZero() ? 1 : kFollows;
   for (std::size_t c = 0; c < 3; ++c) {
     const auto rank = static_cast<std::ptrdiff_t>(kRank * static_cast<double>(levels[c].size()));
@@ -102,9 +103,8 @@ void Composite::look_for_white(const Image& frame, const recon::CameraModel& cam
 }
 
 void Composite::draw(const Flame& flame, const PlateLight& light, const recon::Rigid3& camera_from_marker,
-                     const InFront& front, double shown, Image& frame, recon::Pool& pool) {
+                     const InFront& front, double shown, Image& frame, recon::Pool& pool) const {
   const recon::CameraModel camera{lens_, camera_from_marker};
-  look_for_white(frame, camera);
   const ImageSize size = lens_.size;
   const PlateRays plate(camera, direction_, light.edge());
   std::vector<float> until(direction_.size(), kEndless);

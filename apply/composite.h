@@ -43,22 +43,21 @@ class Composite {
   Composite(const recon::Intrinsics& lens, const Marker& marker, Transfer::Curve curve,
             const CompositeOptions& options = {});
 
+  /// Takes the level of the marker's white from a frame in which it is seen; until the first the flame lights
+  /// nothing. Exposure changes slowly, so a single frame counts little.
+  void take_white(const Image& frame, const recon::Rigid3& camera_from_marker);
   /// Draws into an rgb8 frame of the camera's size. `shown`: 0..1, of the flame and its light. Where the
   /// light on the plate ends the plate ends too: what of the flame lies behind it is seen beyond.
   void draw(const Flame& flame, const PlateLight& light, const recon::Rigid3& camera_from_marker,
-            const InFront& front, double shown, Image& frame, recon::Pool& pool);
-  /// The level of the marker's white, linear, of the frames drawn last; 0 before the first.
-  [[nodiscard]] const Eigen::Vector3d& white() const { return white_; }
+            const InFront& front, double shown, Image& frame, recon::Pool& pool) const;
 
  private:
-  void look_for_white(const Image& frame, const recon::CameraModel& camera);
-
   recon::Intrinsics lens_;
   Eigen::Vector2d marker_size_;
   Transfer transfer_;
   CompositeOptions options_;
-  std::vector<Eigen::Vector2f> direction_;  ///< of each pixel, x / z and y / z
-  Eigen::Vector3d white_ = Eigen::Vector3d::Zero();
+  std::vector<Eigen::Vector2f> direction_;           ///< of each pixel, x / z and y / z
+  Eigen::Vector3d white_ = Eigen::Vector3d::Zero();  ///< linear grey levels
 };
 
 }  // namespace emberlock::apply

@@ -59,8 +59,8 @@ double PoseTrack::variance_of(const MarkerPose& pose, std::size_t points) {
   const double own = pose.rms * pose.rms * n / (2 * n - 6);  // a pose takes up six of the 2 n values
   constexpr double kFollows = 0.05;
   constexpr double kFar = 9;
-  noise_ += kFollows * (std::min(own, kFar * noise_) - noise_);
   const double least = options_.least_sigma * options_.least_sigma;
+  noise_ += kFollows * (std::min(own, kFar * std::max(noise_, least)) - noise_);
   return std::max({least, noise_, own / kFar});
 }
 
@@ -143,6 +143,8 @@ std::optional<PoseTrack::Update> PoseTrack::updated(const MotionState& predicted
 
 TrackStep PoseTrack::see(Seconds time, const std::vector<MarkerPoint>& points) {
   TrackStep step;
+  constexpr Seconds kPause{1};  // of the film: nothing is known behind it
+  if (state_ && time - time_ > kPause) state_.reset();
   if (state_) predict(std::max((time - time_).value(), 1e-6), step);
   time_ = time;
   const std::vector<MarkerPose> poses = marker_poses(points, lens_);

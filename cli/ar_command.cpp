@@ -158,6 +158,8 @@ Status draw_frames(const ArArguments& a, ArFilm& film, const ArPoses& poses, Dra
     EMBERLOCK_ASSIGN_OR_RETURN(const apply::FlamePlayer::Shown* shown,
                                drawing.flame.at(film.times()[f], drawing.pool));
     const apply::TrackedPose& pose = poses.frames[f];
+    if (pose.from == apply::TrackedPose::From::marker)
+      drawing.composite.take_white(frame, pose.camera_from_marker);
     if (shown != nullptr && pose.from != apply::TrackedPose::From::nothing)
       drawing.composite.draw(*shown->flame, shown->light, pose.camera_from_marker, front, pose.shown, frame,
                              drawing.pool);

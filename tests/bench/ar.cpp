@@ -20,6 +20,7 @@
 #include <nlohmann/json.hpp>
 #include <opencv2/imgproc.hpp>
 
+#include "apply/transfer.h"
 #include "recon/calibrate/rig.h"
 #include "recon/export/volume_file.h"
 #include "recon/hull/hull.h"
@@ -48,11 +49,17 @@ bool write_flame(const fs::path& folder) {
   return recon::write_volume(recon::Flame(options).at(Seconds(0), grid).volume, folder / "volume.vdb").ok();
 }
 
+/// By a lens: light is blurred, not levels.
 Image blurred(const Image& sharp, double sigma) {
+  const apply::Transfer transfer(apply::Transfer::Curve::srgb);
+  cv::Mat light(480, 640, CV_32FC3);
+  auto* values = light.ptr<float>();
+  for (std::size_t i = 0; i < sharp.bytes().size(); ++i)
+    values[i] = transfer.light(static_cast<std::uint8_t>(sharp.bytes()[i]));
+  cv::GaussianBlur(light, light, {}, sigma);
   Image image = sharp;
-  const cv::Mat from(480, 640, CV_8UC3, const_cast<std::byte*>(sharp.bytes().data()));
-  cv::Mat to(480, 640, CV_8UC3, image.bytes().data());
-  cv::GaussianBlur(from, to, {}, sigma);
+  for (std::size_t i = 0; i < image.bytes().size(); ++i)
+    image.bytes()[i] = static_cast<std::byte>(transfer.level(values[i]));
   return image;
 }
 

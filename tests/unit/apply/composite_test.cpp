@@ -41,6 +41,7 @@ class CompositeTest : public testing::Test {
               double plane = 0, double shown = 1, Transfer::Curve curve = Transfer::Curve::linear) {
     Composite composite(camera.intrinsics, usual_marker(), curve);
     const PlateLight light = plane > 0 ? PlateLight(what, plane, 65, pool_) : PlateLight();
+    composite.take_white(frame, camera.camera_from_world);
     composite.draw(what, light, camera.camera_from_world, front, shown, frame, pool_);
     return frame;
   }
@@ -195,6 +196,7 @@ TEST_F(CompositeTest, TheSameForAnyNumberOfThreads) {
   recon::Pool alone(1);
   Composite composite(small_lens(), usual_marker(), Transfer::Curve::linear);
   Image frame = even(60);
+  composite.take_white(frame, camera_.camera_from_world);
   composite.draw(fire, PlateLight(fire, 1, 65, alone), camera_.camera_from_world, {}, 1, frame, alone);
   EXPECT_TRUE(same(frame, two));
 }

@@ -168,6 +168,39 @@ TEST_F(ArCommandTest, WhatCannotBeDrawnLeavesNothing) {
   expect_refused(run({"--rig", rig}, "text.mp4"), "text.mp4");
 }
 
+/// A recorded camera, at its own pace, and virtual ones, before which no marker lies.
+TEST_F(ArCommandTest, ACameraOfARigFilms) {
+  const test::Plate plate(test::usual_marker());
+  auto writer = session::SessionWriter::create(
+      temp_ / "take", test::manifest_of({{kFilmed, PixelFormat::rgb8, 8}}), test::small_disk_options());
+  ASSERT_TRUE(writer.ok());
+  for (std::uint64_t f = 0; f < 6; ++f) {
+    const auto ns = static_cast<std::int64_t>(f) * 33'000'000;
+    const FrameStamp stamp{f, {ns}, {1'700'000'000'000'000'000 + ns}, {ns}, FrameStatus::complete};
+    const Image picture = plate.seen_by(hand_at(static_cast<int>(f)));
+    ASSERT_TRUE(writer->write(0, {stamp, std::make_shared<const Image>(picture)}).ok());
+  }
+  ASSERT_TRUE(writer->finish().ok());
+  const fs::path config = temp_ / "rig.toml";
+  std::ofstream(config) << "[rig.replay]\nsession = \"take\"\n[[rig.camera]]\ndriver = \"replay\"\n";
+  const std::vector<std::string> words{"ar",       "cam0",           (temp_ / "fire").string(),
+                                       "--out",    out_.string(),    "--marker",
+                                       "aruco:4X4_50:7:80mm",        "--focal",
+                                       "240",      "--config",       config.string()};
+  const auto done = test::run_verb(add_ar, words);
+  ASSERT_EQ(done.exit_code, 0) << done.err;
+  EXPECT_THAT(done.out, HasSubstr("seen in 6, predicted in 0"));
+  EXPECT_NEAR(poses()["frames"][5]["time_s"].get<double>(), 5 * 0.033, 0.02);
+  fs::remove_all(out_);
+  std::vector<std::string> other = words;
+  other[1] = "cam7";
+  expect_refused(test::run_verb(add_ar, other), "Its cameras are cam0");
+  std::ofstream(config) << "[[rig.camera]]\ndriver = \"virtual\"\nid = \"eye\"\nsize = \"160x120\"\n";
+  other[1] = "eye";
+  other.insert(other.end(), {"--seconds", "0.2"});
+  expect_refused(test::run_verb(add_ar, other), "none of its frames shows");
+}
+
 /// Containers may change size within a stream; a film made of MJPEG pictures of two sizes does.
 TEST_F(ArCommandTest, AVideoThatChangesItsSizeIsRefusedByItsFrame) {
   std::ofstream film(temp_ / "two.mjpeg", std::ios::binary);

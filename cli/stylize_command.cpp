@@ -87,7 +87,7 @@ class StylizeRun {
           operation ? stylization_.apply(std::move(operation).value()) : Status(operation.error());
       ++taken_;
       if (taken.ok())
-        end_ = stylization_.passes() + a_.passes.value_or(kPassesAfterAnEdit);
+        end_ = std::max(end_, stylization_.passes() + a_.passes.value_or(kPassesAfterAnEdit));
       else
         std::fprintf(stderr, "emberlock: line %d is left out: %s\n", taken_, taken.error().message().c_str());
     }

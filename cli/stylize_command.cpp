@@ -9,6 +9,7 @@
 #include <vector>
 
 #include <fmt/format.h>
+#include <nlohmann/json.hpp>
 #include <unistd.h>
 
 #include "apply/stylize.h"
@@ -86,23 +87,31 @@ class StylizeRun {
           operation ? stylization_.apply(std::move(operation).value()) : Status(operation.error());
       ++taken_;
       if (taken.ok())
-        end_ = stylization_.passes() + a_.passes.value_or(kPassesAfterAnEdit);
+        end_ = std::max(end_, stylization_.passes() + a_.passes.value_or(kPassesAfterAnEdit));
       else
         std::fprintf(stderr, "emberlock: line %d is left out: %s\n", taken_, taken.error().message().c_str());
     }
   }
   Status pass() {
     EMBERLOCK_RETURN_IF_ERROR(stylization_.pass());
-    if (a_.live) {
-      std::printf("{\"pass\": %d, \"residual\": %.6g, \"lines\": %d}\n", stylization_.passes(),
-                  stylization_.residual(), taken_);
-      std::fflush(stdout);
+    std::string preview;
+    if (a_.previews) {
+      EMBERLOCK_ASSIGN_OR_RETURN(preview, write_preview());
     }
-    if (!a_.previews) return {};
-    constexpr int kWidest = 320;
+    if (!a_.live) return {};
+    nlohmann::ordered_json told = {
+        {"pass", stylization_.passes()}, {"residual", stylization_.residual()}, {"lines", taken_}};
+    if (a_.previews) told["preview"] = preview;
+    std::puts(told.dump().c_str());
+    std::fflush(stdout);
+    return {};
+  }
+  Result<std::string> write_preview() const {
+    constexpr int kWidest = 640;
     const recon::RadianceImage seen = stylization_.preview(stylization_.shown(), view_, kWidest);
-    return recon::write_png(recon::to_rgb8(seen).view(),
-                            folder_ / "previews" / fmt::format("{:04}.png", stylization_.passes()));
+    const fs::path file = folder_ / "previews" / fmt::format("{:04}.png", stylization_.passes());
+    EMBERLOCK_RETURN_IF_ERROR(recon::write_png(recon::to_rgb8(seen).view(), file));
+    return file.string();
   }
 
   const StylizeArguments& a_;
@@ -251,7 +260,7 @@ void add_stylize(CLI::App& app) {
   verb->add_flag(
       "--live", a.live,
       "Read further steps from stdin, a JSON object a line, that take effect before the next pass; "
-      "a line of JSON on stdout tells of each pass. Ends after the end of stdin");
+      "a line of JSON on stdout tells of each pass, and where its preview is. Ends after the end of stdin");
   verb->add_option("--passes", a.passes,
                    "After the last step [the file's number in all, or 60]; live: after each")
       ->check(CLI::Range(0, 1000000));

@@ -181,8 +181,6 @@ double RunningSolve::pass() {
   return descent_->fit_error();
 }
 
-double RunningSolve::judge() { return descent_->judge(); }
-
 Volume RunningSolve::volume() const {
   return to_volume(descent_->engine().get(), level_->problem, hull_, effects_);
 }

@@ -41,8 +41,6 @@ class RunningSolve {
   [[nodiscard]] Volume volume() const;
   [[nodiscard]] const Hull& hull() const { return hull_; }
   [[nodiscard]] const Effects& effects() const { return effects_; }
-  /// How well the pictures are shown now, over all rays, those in darkness included; grey levels.
-  double judge();
 
  private:
   RunningSolve(const PreparedScene& scene, const Reconstruction& from, const SolveOptions& options,
@@ -52,7 +50,7 @@ class RunningSolve {
   void take_views(const PreparedScene& scene);
   /// Marks where the pictures show light beyond their masks; whether there was any.
   bool widen_masks(const Scene& before, const Scene& after);
-  /// Splits x of all light into what shines and what is laid aside, and says so to the rays.
+  /// Splits all light into what shines and what is laid aside, and says so to the rays.
   void lay_aside(const Volume& all);
   /// With what was laid aside.
   [[nodiscard]] Volume all_light() const;

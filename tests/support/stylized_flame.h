@@ -31,14 +31,15 @@ inline recon::SolveOptions stylize_options(int threads = 2) {
   solve.compute.threads = threads;
   return solve;
 }
-inline ReconstructedFlame reconstructed_flame(ImageSize image = {96, 72}, int voxels = 28, int threads = 2) {
+inline ReconstructedFlame reconstructed_flame(ImageSize image = {96, 72}, int voxels = 28, int threads = 2,
+                                              const std::string& effects = "extinction=32.8") {
   recon::PaperSceneOptions of_scene;
   of_scene.image = image;
   of_scene.truth_voxels = 48;
   ReconstructedFlame flame{recon::paper_scene(of_scene), {}};
   recon::ReconstructOptions options;
   options.voxels = voxels;
-  options.effects = *recon::parse_effects("extinction=32.8");
+  options.effects = *recon::parse_effects(effects);
   options.correct_pointing = false;
   options.solve = stylize_options(threads);
   const SteadyClock clock;

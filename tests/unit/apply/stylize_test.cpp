@@ -138,6 +138,23 @@ TEST(Stylization, LightBeyondTheFlameGrowsTheMediumWhereAllViewsAllowIt) {
             before + 0.02 * light_in(run->shown().volume, there, false));
 }
 
+TEST(Stylization, EditsMoveLightAndLeaveAReconstructedExtinctionAsItIs) {
+  const test::ReconstructedFlame flame = test::reconstructed_flame({64, 48}, 20, 2, "extinction=field");
+  const std::vector<float>& before = flame.outcome.reconstruction.volume.extinction;
+  ASSERT_FALSE(before.empty());
+  const auto run = test::begin_stylization(flame);
+  const double inside = light_in(run->shown().volume, kSlab, true);
+  do_edit(*run, BrushEdit{flame.scene.views[0].name, {{32, 26}}, 5, BrushEdit::Mode::erase, 0});
+  do_edit(*run, RegionEdit{kSlab, Part::cut});
+  do_passes(*run, 2);
+  EXPECT_EQ(light_in(run->shown().volume, kSlab, true), 0);
+  do_edit(*run, Undo{});
+  do_passes(*run, 1);
+  EXPECT_GT(light_in(run->shown().volume, kSlab, true), 0.5 * inside);
+  const std::vector<float> after = run->shown().volume.extinction;
+  for (std::size_t p = 0; p < before.size(); ++p) EXPECT_NEAR(after[p], before[p], 1e-5F * before[p]) << p;
+}
+
 TEST(Stylization, GoesDarkWhereAllPicturesAreMaskedOut) {
   const test::ReconstructedFlame& flame = test::the_flame();
   const auto run = test::begin_stylization(flame);

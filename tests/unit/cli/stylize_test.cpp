@@ -130,8 +130,8 @@ TEST_F(StylizeVerb, TakesStepsWhileItRunsAndRecordsThoseThatCouldBeDone) {
 {"op": "undo"})");
   const test::VerbRun live = run({"--live", "--voxels", "12", "--passes", "2"});
   ASSERT_EQ(live.exit_code, 0) << live.err;
-  EXPECT_THAT(live.out, HasSubstr(R"({"pass": 2,)"));
-  EXPECT_THAT(live.out, HasSubstr(R"("lines": 4})"));
+  EXPECT_THAT(live.out, HasSubstr(R"({"pass":2,)"));
+  EXPECT_THAT(live.out, HasSubstr(R"("lines":4})"));
   EXPECT_THAT(live.err, HasSubstr("line 2 is left out"));
   EXPECT_THAT(live.err, HasSubstr("line 4 is left out"));
   const auto recorded = apply::read_edits(out_ / "edits.json");

@@ -9,7 +9,7 @@ import {join} from 'node:path';
 import type {Browser, Page} from 'playwright-core';
 import {afterAll, beforeAll, expect, test} from 'vitest';
 
-import type {FilmingCamera} from '../../../daemon/console/src/viewer/contents';
+import type {FilmingCamera, View} from '../../../daemon/console/src/viewer/contents';
 import {screenshot, startChromium, until} from '../support/chromium';
 import {flame, type Made, openMade, sampled} from '../support/viewer_page';
 
@@ -119,9 +119,10 @@ test('it is turned by mouse, wheel and keys, and looks from the cameras', async 
     return uri;
   })();
   const camera = (name: string, role: 'input' | 'held_out', rotation: readonly number[]): FilmingCamera =>
-    ({name, role, size: [320, 240], focal: [300, 300], middle: [160, 120], rotation, translation: [0, 0, 1.6], rmse: [1, 2, 3], captured: red, rendered: red});
+    ({name, role, size: [320, 240], focal: [300, 300], middle: [160, 120], rotation, translation: [0, 0, 1.6]});
+  const seen = (error: number): View => ({rmse: [error, error, error], captured: red, rendered: red});
   const cameras = [camera('from x', 'input', [0, 1, 0, 0, 0, -1, -1, 0, 0]), camera('from y', 'held_out', [-1, 0, 0, 0, 0, -1, 0, -1, 0])];
-  const {page, complaints} = await open([flame(33)], {cameras, trace: [{seconds: 1, input: 4, held_out: 5}, {seconds: 2, input: 3, held_out: 4}]});
+  const {page, complaints} = await open([{...flame(33), views: [seen(1), seen(2)]}, {...flame(17), views: [seen(4), seen(3)]}], {cameras, trace: [{seconds: 1, input: 4, held_out: 5}, {seconds: 2, input: 3, held_out: 4}]});
   const stage = page.locator('canvas.stage');
   const picture = () => stage.evaluate(canvas => (canvas as HTMLCanvasElement).toDataURL());
   let before = await picture();
@@ -147,9 +148,13 @@ test('it is turned by mouse, wheel and keys, and looks from the cameras', async 
   await page.getByRole('button', {name: 'Look from there'}).click();
   await changed('as the camera does');
   await page.waitForSelector('canvas[data-view="1"]');
-  expect(await page.getByText('RMS 1.00 / 2.00 / 3.00').count()).toBe(1);
+  expect(await page.getByText('RMS 2.00 / 2.00 / 2.00').count()).toBe(1);
   await page.getByRole('button', {name: 'See it all'}).click();
   await changed('all');
+  // Each frame has its pictures, and a plot tells which is worse.
+  await page.getByLabel('Frame of the sequence').press('End');
+  await until(() => page.getByText('RMS 3.00 / 3.00 / 3.00').count(), count => count === 1, 'the other frame’s view');
+  expect(await page.getByRole('img', {name: 'Error of each frame'}).isVisible()).toBe(true);
   await screenshot(page, 'viewer-cameras', true);
   await page.addScriptTag({path: axe});
   const told = await page.evaluate(async () => {

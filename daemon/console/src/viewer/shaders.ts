@@ -18,11 +18,8 @@ uniform vec4 told[TOLD];        // March.asTold()
 #define lens told[4]
 #define points told[5].xyz
 #define bricks ivec3(told[6].xyz)
-#define scale told[7]
-#define range told[8]
-#define levels told[9]
 out vec4 colour;
-const float kThrough = 1. / 512., UNTOLD = -1e30;
+const float kThrough = 1. / 512., UNTOLD = -1e30, UNSEEN = -3e30;  // what is not told; what was leapt over
 `;
 
 interface Steps {
@@ -37,8 +34,9 @@ const kMarch = ({begin, sample, stopped, leapt, end}: Steps) => `${kHead}
 vec4 at(vec3 p) { return texture(values, (p + .5) / points); }
 vec4 hueOf(float share) { return texture(colours, vec2((255. * clamp(share, 0., 1.) + .5) / 256., .5)); }
 float quotient(vec4 v) { return v.y > .02 ? v.x / v.y : UNTOLD; }
-int bandOf(float value) { return value == UNTOLD ? -1 : int(dot(step(levels, vec4(value)), vec4(1))); }
+int bandOf(float value) { return value == UNTOLD ? -1 : int(dot(step(told[9], vec4(value)), vec4(1))); }
 void main() {
+  vec4 scale = told[7], range = told[8], levels = told[9];
   vec2 pixel = (vec2(gl_FragCoord.x, rows - gl_FragCoord.y) - lens.zw) / lens.xy;
   vec3 way = normalize(axes * vec3(pixel, 1.));
   way += vec3(equal(way, vec3(0))) * 1e-9;
@@ -100,6 +98,7 @@ const kQuantity = (surfaces: boolean) => kMarch({begin: surfaces ? `
       }
       ${surfaces ? 'stop = value < least || value >= most;' : ''}`, stopped: surfaces ? `
       if (stop) {
+        if (past == UNSEEN) past = quotient(at(p - over));
         int band = bandOf(value);
         int before = bandOf(past), up = band > before ? 1 : -1;
         if (min(band, before) >= 0) for (int m = before; m != band; m += up) {
@@ -118,7 +117,7 @@ const kQuantity = (surfaces: boolean) => kMarch({begin: surfaces ? `
         least = band < 0 ? -2e30 : band == 0 ? -1e29 : levels[band - 1];
         most = band < 0 ? -1e29 : band < 4 ? levels[band] : 1e30;
         empty = band <= 0;
-      }` : '', leapt: surfaces ? 'value = quotient(at(start + float(n - 1) * over));' : '', end: `
+      }` : '', leapt: surfaces ? 'value = UNSEEN;' : '', end: `
   colour = vec4(light, through);`});
 
 export const kFragments = {light: kColour(false), absorbed: kColour(true), quantity: kQuantity(false), surfaces: kQuantity(true)};

@@ -11,6 +11,7 @@ const kHead = `
 @group(0) @binding(4) var smoothly: sampler;
 const kThrough = 1. / 512.;
 const UNTOLD = -1e30;
+const UNSEEN = -3e30;  // what was leapt over
 struct Out { @location(0) light: vec4f, @location(1) through: vec4f }
 
 @vertex fn whole(@builtin(vertex_index) n: u32) -> @builtin(position) vec4f {
@@ -110,6 +111,7 @@ const kQuantity = (surfaces: boolean) => kMarch({begin: `
         }
         ${surfaces ? 'stop = value < least || value >= most;' : ''}`, stopped: surfaces ? `
       if (stop) {
+        if (past == UNSEEN) { past = quotient(at(p - over)); }
         let band = bandOf(value);
         let before = bandOf(past);
         let up = select(-1, 1, band > before);
@@ -134,6 +136,6 @@ const kQuantity = (surfaces: boolean) => kMarch({begin: `
         least = select(select(levels[max(band - 1, 0)], -1e29, band == 0), -2e30, band < 0);
         most = select(select(1e30, levels[min(band, 3)], band < 4), -1e29, band < 0);
         empty = band <= 0;
-      }` : '', leapt: surfaces ? 'value = quotient(at(start + f32(n - 1) * over));' : '', end: ''});
+      }` : '', leapt: surfaces ? 'value = UNSEEN;' : '', end: ''});
 
 export const kGpuShaders: Record<Kind, string> = {light: kColour(false), absorbed: kColour(true), quantity: kQuantity(false), surfaces: kQuantity(true)};

@@ -19,7 +19,7 @@
 namespace emberlock::apply {
 namespace {
 
-constexpr ImageSize kPicture{40, 30};
+constexpr ImageSize kDrawn{40, 30};
 
 /// A textured floor, a plate above a part of it, and bumps with smooth normals.
 Mesh furnished() {
@@ -63,7 +63,7 @@ class Furnished {
     PictureOptions options;
     options.samples = 20;
     return scene_picture(some, {surfaces, light_, {1, 2, 3}},
-                         test::camera_at({0.3, -1.6, 0.9}, {0, 0, 0.1}, kPicture, 45), options, on);
+                         test::camera_at({0.3, -1.6, 0.9}, {0, 0, 0.1}, kDrawn, 45), options, on);
   }
 
   recon::Pool pool;
@@ -122,7 +122,7 @@ TEST(SceneKernels, ATreeOfBoxesShowsWhatEmbreeShows) {
   const Flame flame({test::volume_of({{0, 0, 0.05F}, 0.02F, 10, 11, 12}, test::uneven(1, 2000, 15))}, {}, 1,
                     16, pool);
   const std::vector<const Flame*> flames{&flame};
-  const recon::CameraModel camera = test::camera_at({0.3, -1.6, 0.9}, {0, 0, 0.1}, kPicture, 45);
+  const recon::CameraModel camera = test::camera_at({0.3, -1.6, 0.9}, {0, 0, 0.1}, kDrawn, 45);
   PictureOptions options;
   options.samples = 8;
   const ScenePicture expected = scene_picture(flames, {*surfaces}, camera, options, pool);

@@ -341,9 +341,9 @@ tinygltf::Model model_of(const std::string& bytes, const fs::path& file) {
   tinygltf::TinyGLTF loader;
   // Pictures are kept as they are: those that are shown are decoded later, within bounds.
   loader.SetImageLoader(
-      [](tinygltf::Image* image, int, std::string*, std::string*, int, int, const unsigned char* bytes,
+      [](tinygltf::Image* image, int, std::string*, std::string*, int, int, const unsigned char* content,
          int bytes_there, void*) {
-        image->image.assign(bytes, bytes + std::max(0, bytes_there));
+        image->image.assign(content, content + std::max(0, bytes_there));
         return true;
       },
       nullptr);

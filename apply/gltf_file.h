@@ -18,7 +18,7 @@ namespace emberlock::apply {
 /// A surface that reflects evenly to all sides (Lambert), on both faces.
 struct Material {
   std::array<float, 3> albedo = {1, 1, 1};   ///< 0..1
-  std::array<float, 3> emitted = {0, 0, 0};  ///< radiance, grey levels; it lights nothing else
+  std::array<float, 3> emitted = {0, 0, 0};  ///< radiance to both sides, grey levels
   int texture = -1;                          ///< a factor of the albedo; -1: none
 };
 

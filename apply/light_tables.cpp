@@ -26,8 +26,9 @@ OutsideTable outside_of(const recon::Light& light) {
 
 }  // namespace
 
-LightTables::LightTables(const std::vector<const Flame*>& of, const recon::Light& light)
-    : outside(outside_of(light)) {
+LightTables::LightTables(const std::vector<const Flame*>& of, const recon::Light& light,
+                         const std::vector<GlowingTriangle>& glowing)
+    : panels(glowing), outside(outside_of(light)) {
   double sum = 0;
   for (std::size_t f = 0; f < of.size(); ++f) {
     flames.push_back(of[f]->table());
@@ -36,6 +37,12 @@ LightTables::LightTables(const std::vector<const Flame*>& of, const recon::Light
       emitters.push_back({static_cast<std::uint32_t>(f), e.voxel});
       power_until.push_back(sum);
     }
+  }
+  for (std::size_t p = 0; p < panels.size(); ++p) {
+    const double area = static_cast<double>(length(cross(panels[p].along, panels[p].aside))) / 2;
+    sum += area * static_cast<double>(apply::sum(panels[p].emitted)) / 3;
+    emitters.push_back({EmitterRow::kTriangle, static_cast<std::uint32_t>(p)});
+    power_until.push_back(sum);
   }
   constexpr std::size_t kShares = 4096;
   std::uint32_t emitter = 0;

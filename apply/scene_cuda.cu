@@ -110,7 +110,9 @@ void trace_on_cuda(const std::vector<FlameWork>& flames, const LightTable& light
   const CudaBuffer<EmitterRow> emitters(lights.emitters, lights.glowing);
   const CudaBuffer<double> power_until(lights.power_until, lights.glowing);
   const CudaBuffer<std::uint32_t> guide(lights.guide, lights.shares);
+  const CudaBuffer<GlowingTriangle> panels(lights.panels, lights.panel_count);
   LightTable there = lights;
+  there.panels = panels.data();
   there.flames = tables.data();
   there.emitters = emitters.data();
   there.power_until = power_until.data();

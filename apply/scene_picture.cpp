@@ -80,7 +80,7 @@ ScenePicture scene_picture(const std::vector<const Flame*>& flames, const Surrou
   ScenePicture picture{recon::RadianceImage(size), {}, {}};
   picture.opacity.resize(picture.light.rgb.size() / 3);
   picture.error.resize(picture.opacity.size());
-  LightTables tables(flames, around.light);
+  LightTables tables(flames, around.light, around.surfaces.glowing());
   std::vector<Flame::View> views;
   views.reserve(flames.size());
   for (std::size_t f = 0; f < flames.size(); ++f) {

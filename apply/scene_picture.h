@@ -17,15 +17,15 @@ namespace emberlock::apply {
 // The picture of flames among surfaces. Through each pixel's centre all flames are marched at once
 // (kernels/merged_light.h); samples through places within the pixel meet surfaces at distances z and shine by
 //   L = L_flames(z) + T_flames(z) (emitted + albedo (E / pi + outside))
-// with one random sample of the flames' irradiance E each (kernels/surface_light.h), and the light from
-// outside as it falls there (light_tables.h). So flames have no noise: without surfaces a picture is that of
-// render_view(), and what isn't exact then is the difference between the light of a flame at a pixel's centre
-// and its mean over the pixel, as there.
+// with one random sample of the irradiance E of flames and of surfaces that glow each
+// (kernels/surface_light.h), and the light from outside as it falls there (light_tables.h). So flames have no
+// noise: without surfaces a picture is that of render_view(), and what isn't exact then is the difference
+// between the light of a flame at a pixel's centre and its mean over the pixel, as there.
 //
 // Smoke scatters the light from outside (Flame::light_by()), in which surfaces and other smoke shade it, and
 // what it scatters falls on surfaces.
 //
-// Not simulated: light from surface to surface, light that surfaces emit onto others, a flame's in-scatter
+// Not simulated: light from surface to surface, light that surfaces emit onto smoke, a flame's in-scatter
 // onto surfaces (it is shown to cameras), light of one flame scattered by another's smoke, shade in the light
 // from all sides, mirrors, glass, rays bent by hot gas, the shutter's time.
 

@@ -63,6 +63,16 @@ struct Surfaces::Parts {
       texels.insert(texels.end(), t.rgb.begin(), t.rgb.end());
       t.rgb = {};
     }
+    find_glowing();
+  }
+  void find_glowing() {
+    for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
+      const Vec3& emitted = materials[mesh.material[t]].emitted;
+      if (!(sum(emitted) > 0)) continue;
+      const auto corner = [&](std::size_t c) { return vec3_of(mesh.vertices[mesh.triangles[t][c]]); };
+      const GlowingTriangle one{corner(0), corner(1) - corner(0), corner(2) - corner(0), emitted};
+      if (length(cross(one.along, one.aside)) > 0) glowing.push_back(one);
+    }
   }
   Parts(Parts&&) = delete;
   Parts& operator=(Parts&&) = delete;
@@ -75,6 +85,7 @@ struct Surfaces::Parts {
   std::vector<MaterialRow> materials;
   std::vector<TextureRow> textures;
   std::vector<std::uint8_t> texels;
+  std::vector<GlowingTriangle> glowing;
   RTCDevice device = nullptr;
   RTCScene scene = nullptr;
 };
@@ -90,6 +101,7 @@ EmbreeTriangles Surfaces::triangles() const { return {parts_->scene}; }
 const std::vector<MaterialRow>& Surfaces::materials() const { return parts_->materials; }
 const std::vector<TextureRow>& Surfaces::textures() const { return parts_->textures; }
 const std::vector<std::uint8_t>& Surfaces::texels() const { return parts_->texels; }
+const std::vector<GlowingTriangle>& Surfaces::glowing() const { return parts_->glowing; }
 
 SurfaceTable Surfaces::table() const {
   const Mesh& m = parts_->mesh;

@@ -5,6 +5,7 @@
 
 #include "apply/gltf_file.h"
 #include "apply/kernels/surface.h"
+#include "apply/kernels/surface_light.h"
 #include "base/result.h"
 
 struct RTCSceneTy;
@@ -39,6 +40,8 @@ class Surfaces {
   [[nodiscard]] const std::vector<MaterialRow>& materials() const;
   [[nodiscard]] const std::vector<TextureRow>& textures() const;
   [[nodiscard]] const std::vector<std::uint8_t>& texels() const;
+  /// Those whose material shines.
+  [[nodiscard]] const std::vector<GlowingTriangle>& glowing() const;
 
   /// What it keeps in a GPU's memory from picture to picture (scene_cuda.h).
   [[nodiscard]] std::shared_ptr<SurfacesOnGpu>& on_gpu() const { return on_gpu_; }

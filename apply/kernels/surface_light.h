@@ -12,9 +12,26 @@
 
 namespace emberlock::apply {
 
-/// A voxel of a flame's coarse grid that glows.
+/// What sends light: a voxel of a flame's coarse grid, or a triangle.
 struct EmitterRow {
-  std::uint32_t flame, voxel;
+  static constexpr std::uint32_t kTriangle = ~0U;  // as flame
+  std::uint32_t flame, number;
+};
+
+/// A triangle that shines evenly to both sides.
+struct GlowingTriangle {
+  Vec3 corner, along, aside;  ///< edges from the corner
+  Vec3 emitted;               ///< radiance, grey levels
+
+  /// A place in it (within: 0..1 twice), and what it sends along a direction (unit length): its radiance
+  /// times its area as seen from there, grey levels m2.
+  HOST_DEVICE inline void at(const Vec3& within, Vec3& place) const {
+    const bool beyond = within.x + within.y > 1;
+    place = corner + (beyond ? 1 - within.x : within.x) * along + (beyond ? 1 - within.y : within.y) * aside;
+  }
+  [[nodiscard]] HOST_DEVICE inline Vec3 sent(const Vec3& direction) const {
+    return (0.5F * fabsf(dot(cross(along, aside), direction))) * emitted;
+  }
 };
 
 /// The random numbers of one of a pixel's samples, each in 0..1.
@@ -49,10 +66,13 @@ struct LightTable {
   const std::uint32_t* guide =
       nullptr;  ///< the first emitter of each equal share of the power (Chen and Asau 1974)
   std::uint32_t shares = 0;
+  const GlowingTriangle* panels = nullptr;
+  std::uint32_t panel_count = 0;
   OutsideTable outside;
 };
 
-/// The light that falls on surfaces, and from outside on smoke. Of flames one random sample of the irradiance
+/// The light that falls on surfaces, and from outside on smoke. Of flames, and of triangles that glow, one
+/// random sample of the irradiance
 ///   E(x) = Int S(y) T(x, y) V(x, y) max(0, n . w) / |y - x|^2 dy,  w = (y - x) / |y - x|
 /// over all of them; T is the smoke's transmittance, V whether no surface stands between. Its mean is E, but
 /// for what the coarse grids of the flames leave out.
@@ -62,12 +82,13 @@ struct LightTable {
 /// Talbot, Cline and Egbert 2005). The rest, which would have no bounded variance so, comes along one ray
 /// whose direction is chosen with a chance proportional to its cosine (Malley's method, Pharr, Jakob and
 /// Humphreys, "Physically Based Rendering", section 13.6.3). Far from a flame its a is 0
-/// (FlameTable::close_by()). `Triangles` is what rays are cast at (surfaces.h), kMost the most flames.
+/// (FlameTable::close_by()). Triangles that glow are proposed beside voxels, with a of 0. `Triangles` is what
+/// rays are cast at (surfaces.h), kMost the most flames.
 template <class Triangles, int kMost>
 struct FallingLight : LightTable {
   Triangles triangles;
 
-  /// At a surface with this normal (unit length), grey levels times steradian.
+  /// And of triangles: at a surface with this normal (unit length), grey levels times steradian.
   [[nodiscard]] HOST_DEVICE inline Vec3 of_flames(const Vec3& place, const Vec3& normal,
                                                   const Draw& draw) const {
     if (glowing == 0) return {};
@@ -128,15 +149,19 @@ struct FallingLight : LightTable {
     while (chosen + 1 < glowing && power_until[chosen] <= which * all) ++chosen;
     const EmitterRow& emitter = emitters[chosen];
     const double power = power_until[chosen] - (chosen > 0 ? power_until[chosen - 1] : 0);
-    const FlameTable& flame = flames[emitter.flame];
+    const bool burns = emitter.flame != EmitterRow::kTriangle;
     Proposal one;
     Vec3 sends;
-    flame.sent(emitter.voxel, within, one.place, sends);
+    if (burns)
+      flames[emitter.flame].sent(emitter.number, within, one.place, sends);
+    else
+      panels[emitter.number].at(within, one.place);
     const Vec3 towards = one.place - place;
     const float squared = dot(towards, towards);
     const float cosine = dot(normal, towards) / sqrtf(squared);
     if (!(cosine > 0)) return one;
-    const float a = flame.close_by(place);
+    if (!burns) sends = panels[emitter.number].sent((1 / sqrtf(squared)) * towards);
+    const float a = burns ? flames[emitter.flame].close_by(place) : 0;
     one.irradiance = (static_cast<float>(all / power) * cosine / (squared + a * a)) * sends;
     return one;
   }
@@ -159,7 +184,10 @@ struct FallingLight : LightTable {
     const Vec3 towards = taken.place - place;
     const float distance = length(towards);
     const Vec3 direction = (1 / distance) * towards;
-    if (triangles.blocked(place, direction, clear_of_surface(place), distance)) return {};
+    // Short of the place, where a triangle that glows is itself.
+    if (triangles.blocked(place, direction, clear_of_surface(place),
+                          distance - clear_of_surface(taken.place)))
+      return {};
     float depth = 0;
     for (int f = 0; f < count; ++f) depth += flames[f].depth(place, direction, distance);
     return (all / (kProposals * sum(taken.irradiance)) * expf(-depth)) * taken.irradiance;

@@ -127,7 +127,7 @@ TEST(SceneKernels, ATreeOfBoxesShowsWhatEmbreeShows) {
   options.samples = 8;
   const ScenePicture expected = scene_picture(flames, {*surfaces}, camera, options, pool);
   ScenePicture seen = expected;
-  LightTables tables(flames, {});
+  LightTables tables(flames, {}, surfaces->glowing());
   const Flame::View view = flame.seen_by(camera, options.step, pool);
   tables.flames[0] = flame.table(view);
   PixelTask task;

@@ -118,6 +118,29 @@ TEST_F(ScenePictureTest, AColouredSurfaceReflectsItsShareAndShinesByItself) {
   EXPECT_EQ(seen.error[0], 0);
 }
 
+/// A small square that shines, above a floor that is seen from beneath it: L = emitted A cos^2 / (pi r^2).
+/// Its upper side shines as well, and a plate between them takes it all.
+TEST_F(ScenePictureTest, ASquareThatGlowsLightsAFloor) {
+  const recon::CameraModel camera = camera_at({0.6, 0.2, 0.4}, {0.1, 0, 0}, kSmall, 40);
+  const Flame none = flame(spark(0));
+  for (const bool hidden : {false, true}) {
+    Mesh mesh = floor_of();
+    test::add_square(mesh, 0.1, -0.1, 0.8, 0.02, {{0, 0, 0}, {8000, 4000, 0}});
+    if (hidden) test::add_square(mesh, 0.1, -0.1, 0.79, 0.5);
+    const ScenePicture seen = picture({&none}, built(std::move(mesh)), camera, 128);
+    for (int y = 0; y < kSmall.height; ++y)
+      for (int x = 0; x < kSmall.width; ++x) {
+        const Eigen::Vector3d at = on_floor(camera, x, y);
+        const double r = (Eigen::Vector3d(0.1, -0.1, 0.8) - at).norm();
+        const double expected =
+            hidden ? 0 : 8000 * 0.04 * 0.04 * 0.8 * 0.8 / (std::numbers::pi * std::pow(r, 4));
+        const std::size_t i = 3 * static_cast<std::size_t>(y * kSmall.width + x);
+        ASSERT_NEAR(static_cast<double>(seen.light.rgb[i]), expected, 0.015 * expected) << x << ' ' << y;
+        ASSERT_NEAR(static_cast<double>(seen.light.rgb[i + 1]), expected / 2, 0.0075 * expected);
+      }
+  }
+}
+
 TEST_F(ScenePictureTest, BehindAPlateTheFloorIsDarkAndTheFlameHidden) {
   Mesh mesh = floor_of();
   test::add_square(mesh, 0, 0, 0.4, 1.5);

@@ -183,10 +183,17 @@ TEST_F(ArCommandTest, ACameraOfARigFilms) {
   ASSERT_TRUE(writer->finish().ok());
   const fs::path config = temp_ / "rig.toml";
   std::ofstream(config) << "[rig.replay]\nsession = \"take\"\n[[rig.camera]]\ndriver = \"replay\"\n";
-  const std::vector<std::string> words{"ar",       "cam0",           (temp_ / "fire").string(),
-                                       "--out",    out_.string(),    "--marker",
-                                       "aruco:4X4_50:7:80mm",        "--focal",
-                                       "240",      "--config",       config.string()};
+  const std::vector<std::string> words{"ar",
+                                       "cam0",
+                                       (temp_ / "fire").string(),
+                                       "--out",
+                                       out_.string(),
+                                       "--marker",
+                                       "aruco:4X4_50:7:80mm",
+                                       "--focal",
+                                       "240",
+                                       "--config",
+                                       config.string()};
   const auto done = test::run_verb(add_ar, words);
   ASSERT_EQ(done.exit_code, 0) << done.err;
   EXPECT_THAT(done.out, HasSubstr("seen in 6, predicted in 0"));

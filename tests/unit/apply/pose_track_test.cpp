@@ -160,8 +160,8 @@ TEST(PoseTrackTest, TheMotionTellsWhichOfTwoPosesItIs) {
   const Marker marker = usual_marker();
   PoseTrack track(arm_lens());
   int alone_wrong = 0;
-  for (int f = 0; f < 60; ++f) {
-    const double away = f < 10 ? 0.5 : std::min(2.0, 0.5 + 0.05 * (f - 10));
+  for (int f = 0; f < 150; ++f) {
+    const double away = 1.25 - 0.75 * std::cos(3.14159265358979 * std::clamp((f - 10) / 120.0, 0.0, 1.0));
     const auto camera = test::before_plate(arm_lens(), away * Eigen::Vector3d(0.25, -0.3, 0.9).normalized());
     const auto points = seen(marker, camera, 0.25, static_cast<std::uint64_t>(f));
     const auto turned = [&](const recon::Rigid3& pose) {

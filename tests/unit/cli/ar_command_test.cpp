@@ -14,7 +14,6 @@
 #include "cli/commands.h"
 #include "recon/calibrate/rig.h"
 #include "recon/export/exr_file.h"
-#include "recon/export/picture.h"
 #include "recon/export/volume_file.h"
 #include "session/rig_file.h"
 #include "session/video_writer.h"
@@ -206,22 +205,6 @@ TEST_F(ArCommandTest, ACameraOfARigFilms) {
   other[1] = "eye";
   other.insert(other.end(), {"--seconds", "0.2"});
   expect_refused(test::run_verb(add_ar, other), "none of its frames shows");
-}
-
-/// Containers may change size within a stream; a film made of MJPEG pictures of two sizes does.
-TEST_F(ArCommandTest, AVideoThatChangesItsSizeIsRefusedByItsFrame) {
-  std::ofstream film(temp_ / "two.mjpeg", std::ios::binary);
-  const test::Plate plate(test::usual_marker());
-  for (int f = 0; f < 6; ++f) {
-    recon::CameraModel camera = hand_at(f);
-    if (f >= 4) camera.intrinsics.size = {160, 120};
-    const auto jpeg = recon::to_jpeg(plate.seen_by(camera).view());
-    ASSERT_TRUE(jpeg.ok());
-    film << *jpeg;
-  }
-  film.close();
-  expect_refused(run({"--focal", "240"}, "two.mjpeg"),
-                 "frame 4 has 160 x 120 pixels, and those before it 240 x 180");
 }
 
 }  // namespace

@@ -107,7 +107,7 @@ class StylizeRun {
     return {};
   }
   Result<std::string> write_preview() const {
-    constexpr int kWidest = 640;
+    constexpr int kWidest = 320;
     const recon::RadianceImage seen = stylization_.preview(stylization_.shown(), view_, kWidest);
     const fs::path file = folder_ / "previews" / fmt::format("{:04}.png", stylization_.passes());
     EMBERLOCK_RETURN_IF_ERROR(recon::write_png(recon::to_rgb8(seen).view(), file));

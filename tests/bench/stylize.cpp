@@ -129,12 +129,12 @@ void bench(int voxels, ImageSize image, int threads) {
 /// FOLDER/scene/transforms.json, FOLDER/teapotN.png and FOLDER/edits.json.
 void write_example(const std::filesystem::path& folder) {
   recon::PaperSceneOptions options;
-  options.image = {640, 480};
+  options.image = {480, 360};
   const recon::Scene scene = recon::paper_scene(options);
   demand(test::write_scene(scene, folder / "scene"));
   const test::Teapot teapot({0, 0, -0.02});
   apply::EditFile edits;
-  edits.voxels = 128;
+  edits.voxels = 96;
   edits.passes = 40;
   for (std::size_t v = 0; v < scene.views.size(); ++v) {
     const recon::View& view = scene.views[v];

@@ -45,13 +45,13 @@ struct Teapot {
     const auto put = [&](double x, double z, double radius, double grey, double flat = 1) {
       outside.push_back({place + Eigen::Vector3d(x, 0, z), radius, flat, grey});
     };
-    put(0, 0, 0.027, 150, 0.8);
-    put(0, 0.024, 0.006, 190);
+    put(0, 0, 0.027, 110, 0.8);
+    put(0, 0.024, 0.006, 150);
     for (int n = 0; n < 9; ++n) {
       const double t = n / 8.0;
-      put(0.022 + 0.024 * t, -0.006 + 0.026 * t * t, 0.006 - 0.002 * t, 190);
+      put(0.022 + 0.024 * t, -0.006 + 0.026 * t * t, 0.006 - 0.002 * t, 150);
       const double angle = 1.2 + 3.9 * t;
-      put(-0.03 + 0.016 * std::cos(angle), 0.002 + 0.014 * std::sin(angle), 0.0035, 190);
+      put(-0.03 + 0.016 * std::cos(angle), 0.002 + 0.014 * std::sin(angle), 0.0035, 150);
     }
     inside.push_back({place + Eigen::Vector3d(0.004, 0, -0.004), 0.009, 1, 250});
     for (const double side : {-1.0, 1.0})

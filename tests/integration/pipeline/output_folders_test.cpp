@@ -325,15 +325,16 @@ TEST_F(OutputFolders, TheTablesHoldEveryVerbThatWritesOne) {
        {add_devices, add_smear,    add_align,  add_reconstruct, add_verify,  add_tradeoff, add_calibrate,
         add_import,  add_demo,     add_sample, add_doctor,      add_bench,   add_sessions, add_status,
         add_jobs,    add_watch,    add_record, add_strobe,      add_measure, add_simulate, add_render,
-        add_export,  add_evaluate, add_scene,  add_ar})
+        add_export,  add_evaluate, add_scene,  add_ar,          add_stylize})
     add(app);
   std::set<std::string> found;
   cli::visit(app, "emberlock", [&](const CLI::App& verb, const std::string& path) {
     for (const CLI::Option* option : cli::options_of(verb)) {
       const std::string words = option->get_description();
       const bool folder = words.find("older") != std::string::npos || option->check_lname("out");
-      const bool reads =
-          option->get_positional() || option->check_lname("strobe") || option->check_lname("camera");
+      const bool reads = option->get_positional() || option->check_lname("strobe") ||
+                         option->check_lname("camera") || option->check_lname("mask") ||
+                         option->check_lname("depth") || option->check_lname("rig");
       if (folder && !reads) found.insert(path + " " + option->get_name());
     }
   });

@@ -301,10 +301,11 @@ TEST_F(OutputFolders, TheTablesHoldEveryVerbThatWritesOne) {
     }
   }
   CLI::App app{"", "emberlock"};
-  for (const auto add : {add_devices,   add_smear,    add_align,  add_reconstruct, add_verify,   add_tradeoff,
-                         add_calibrate, add_import,   add_demo,   add_sample,      add_doctor,   add_bench,
-                         add_sessions,  add_status,   add_jobs,   add_watch,       add_record,   add_strobe,
-                         add_measure,   add_simulate, add_render, add_export,      add_evaluate, add_scene})
+  for (const auto add :
+       {add_devices, add_smear,    add_align,  add_reconstruct, add_verify,  add_tradeoff, add_calibrate,
+        add_import,  add_demo,     add_sample, add_doctor,      add_bench,   add_sessions, add_status,
+        add_jobs,    add_watch,    add_record, add_strobe,      add_measure, add_simulate, add_render,
+        add_export,  add_evaluate, add_scene,  add_stylize})
     add(app);
   std::set<std::string> found;
   cli::visit(app, "emberlock", [&](const CLI::App& verb, const std::string& path) {

@@ -128,13 +128,18 @@ std::vector<std::uint8_t> dark_points(const recon::Grid& grid,
   for (const Operation* operation : operations) {
     const auto* edit = std::get_if<RegionEdit>(operation);
     if (edit == nullptr) continue;
-    std::vector<std::uint8_t> inside(grid.size());
-    each_key_point(grid, edit->region, [&](std::size_t p, const Eigen::Vector3d& place) {
-      inside[p] = distance_to(edit->region, place) > 0 ? 0 : 1;
-    });
-    const std::uint8_t lit = edit->part == Part::cut ? 0 : 1;
-    for (std::size_t p = 0; p < dark.size(); ++p)
-      if (inside[p] != lit) dark[p] = 1;
+    const auto each_inside = [&](const auto& act) {
+      each_key_point(grid, edit->region, [&](std::size_t p, const Eigen::Vector3d& place) {
+        if (!(distance_to(edit->region, place) > 0)) act(p);
+      });
+    };
+    if (edit->part == Part::cut) {
+      each_inside([&](std::size_t p) { dark[p] = 1; });
+      continue;
+    }
+    std::vector<std::uint8_t> outside_too(grid.size(), 1);
+    each_inside([&](std::size_t p) { outside_too[p] = dark[p]; });
+    dark.swap(outside_too);
   }
   return dark;
 }

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "apply/stylize.h"
 
+#include <algorithm>
 #include <cmath>
 #include <string>
 #include <utility>
@@ -9,6 +10,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "tests/support/devices.h"
 #include "tests/support/stylized_flame.h"
 
 namespace emberlock::apply {
@@ -201,6 +203,25 @@ TEST(Stylization, ReplaysToTheSameBitsWithAnyNumberOfThreads) {
     EXPECT_EQ(replay->shown().volume.emission, shown.emission) << threads;
     EXPECT_EQ(replay->shown().volume.extinction, shown.extinction);
     EXPECT_EQ(to_json(replay->record()), to_json(run->record()));
+  }
+}
+
+TEST(Stylization, OtherDevicesShowTheSameWithinRounding) {
+  const test::ReconstructedFlame flame = test::reconstructed_flame({64, 48}, 20, 2);
+  const auto here = test::begin_stylization(flame);
+  edit_live(*here, flame.scene);
+  const recon::Volume by_cpu = here->shown().volume;
+  const float brightest = *std::max_element(by_cpu.emission.begin(), by_cpu.emission.end());
+  for (const recon::Device device : other_devices()) {
+    recon::SolveOptions options = test::stylize_options();
+    options.compute.device = device;
+    const auto there = Stylization::begin(flame.scene, flame.outcome, options, Colours::captured,
+                                          recon::standard_response());
+    ASSERT_TRUE(there) << there.error().message();
+    edit_live(**there, flame.scene);
+    const recon::Volume by_gpu = (*there)->shown().volume;
+    for (std::size_t i = 0; i < by_cpu.emission.size(); ++i)
+      EXPECT_NEAR(by_gpu.emission[i], by_cpu.emission[i], 0.02F * brightest) << i;
   }
 }
 

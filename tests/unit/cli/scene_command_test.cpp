@@ -52,12 +52,8 @@ class SceneCommandTest : public testing::Test {
   [[nodiscard]] cv::Mat picture(const std::string& name) const {
     return cv::imread((out_ / name).string(), cv::IMREAD_UNCHANGED);
   }
-  void expect_refused(const test::VerbRun& refused, const std::string& words) const {
-    EXPECT_EQ(refused.exit_code, 2) << refused.out;
-    EXPECT_THAT(refused.err, HasSubstr(words));
-    EXPECT_FALSE(fs::exists(out_));
-    for (const auto& entry : fs::directory_iterator(temp_.path()))
-      EXPECT_THAT(entry.path().filename().string(), testing::Not(HasSubstr("out"))) << "half written";
+  void expect_refused(const test::VerbRun& run, const std::string& words) const {
+    test::expect_refused(run, words, out_);
   }
 
   test::TempFolder temp_;

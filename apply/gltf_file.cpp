@@ -4,12 +4,15 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
+#include <map>
+#include <optional>
 #include <set>
 
 #include <Eigen/Geometry>
 #include <fmt/format.h>
 #include <tiny_gltf.h>
 
+#include "apply/gltf_parts.h"
 #include "apply/unreadable.h"
 #include "base/file.h"
 #include "base/nesting.h"
@@ -19,15 +22,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr float kWhiteLevel = 255;
 constexpr int kDeepestNode = 1000;
-
-template <class T>
-const T& entry(const std::vector<T>& all, int index, const std::string& what) {
-  if (index < 0 || static_cast<std::size_t>(index) >= all.size())
-    refuse(fmt::format("{} {} isn't there", what, index), what);
-  return all[static_cast<std::size_t>(index)];
-}
 
 /// z upwards from y upwards.
 Eigen::Matrix4d world_axes() {
@@ -134,38 +129,24 @@ std::vector<std::uint32_t> indices_of(const tinygltf::Model& model, int accessor
   return out;
 }
 
-Material material_of(const tinygltf::Material& from, const std::string& where) {
-  Material out;
-  double strength = 1;
-  if (const auto at = from.extensions.find("KHR_materials_emissive_strength"); at != from.extensions.end())
-    if (at->second.Has("emissiveStrength")) strength = at->second.Get("emissiveStrength").GetNumberAsDouble();
-  const auto within = [&](double v, double most) {
-    if (!(v >= 0 && v <= most)) refuse("a colour is out of range", where);
-    return static_cast<float>(v);
-  };
-  const auto& base = from.pbrMetallicRoughness.baseColorFactor;
-  for (std::size_t c = 0; c < 3; ++c) {
-    if (c < base.size()) out.albedo[c] = within(base[c], 1);
-    if (c < from.emissiveFactor.size())
-      out.emitted[c] = kWhiteLevel * within(strength * from.emissiveFactor[c], 1e6);
-  }
-  return out;
-}
-
 /// Walks a file's nodes and adds what they hold.
 class GltfReader {
  public:
   GltfReader(const tinygltf::Model& model, const Placement& world_from_file, Mesh& mesh)
       : model_(model), mesh_(mesh), seen_(model.nodes.size()) {
+    for (const Texture& texture : mesh.textures) texels_ += texture.rgb.size() / 3;
     first_material_ = static_cast<std::uint32_t>(mesh.materials.size());
     for (std::size_t i = 0; i < model.materials.size(); ++i) {
       mesh.materials.push_back(material_of(model.materials[i], fmt::format("materials[{}]", i)));
+      mesh.materials.back().texture =
+          texture_number(model.materials[i].pbrMetallicRoughness.baseColorTexture.index);
       note_left_out(model.materials[i]);
     }
     mesh.materials.emplace_back();  // where none is told
     if (!model.animations.empty()) notes_.insert("animation is left out");
     if (!model.skins.empty()) notes_.insert("skins are left out");
-    if (!model.lights.empty()) notes_.insert("its lights are left out: flames are the light");
+    if (!model.lights.empty())
+      notes_.insert("its lights are left out: flames are the light, and a scene file's");
     const Eigen::Matrix4d top = matrix_of(world_from_file) * world_axes();
     if (model.scenes.empty()) refuse("has no scene", "scenes");
     for (const int node : entry(model.scenes, std::max(0, model.defaultScene), "scene").nodes)
@@ -177,9 +158,26 @@ class GltfReader {
   }
 
  private:
+  /// The mesh's own number of a texture; -1 for none, and where it can't be shown.
+  int texture_number(int index) {
+    if (index < 0) return -1;
+    if (entry(model_.textures, index, "texture").source < 0) {
+      notes_.insert("textures that are neither PNG nor JPEG are left out");
+      return -1;
+    }
+    const auto [at, isnew] = textures_.try_emplace(index, static_cast<int>(mesh_.textures.size()));
+    if (isnew) mesh_.textures.push_back(texture_of(model_, index, texels_));
+    return at->second;
+  }
+
   void note_left_out(const tinygltf::Material& m) {
-    if (m.pbrMetallicRoughness.baseColorTexture.index >= 0 || m.emissiveTexture.index >= 0)
-      notes_.insert("textures are left out, and their factors shown");
+    if (m.emissiveTexture.index >= 0 || m.normalTexture.index >= 0 || m.occlusionTexture.index >= 0 ||
+        m.pbrMetallicRoughness.metallicRoughnessTexture.index >= 0)
+      notes_.insert("of textures, the base colour's alone is shown");
+    if (m.pbrMetallicRoughness.baseColorTexture.extensions.contains("KHR_texture_transform"))
+      notes_.insert("textures are shown without their KHR_texture_transform");
+    if (m.pbrMetallicRoughness.metallicFactor > 0 && m.pbrMetallicRoughness.roughnessFactor < 1)
+      notes_.insert("metal is shown as matt");
     if (m.alphaMode != "OPAQUE") notes_.insert("transparent materials are shown opaque");
   }
 
@@ -225,17 +223,19 @@ class GltfReader {
     if (position == primitive.attributes.end()) refuse("a mesh has no POSITION", where);
     const Elements places(model_, position->second, TINYGLTF_TYPE_VEC3, where);
     if (places.kind() != TINYGLTF_COMPONENT_TYPE_FLOAT) refuse("POSITION isn't of floats", where);
+    const std::size_t told =
+        primitive.indices >= 0 ? entry(model_.accessors, primitive.indices, "accessor").count : places.size();
+    if (mesh_.triangles.size() + told / 3 > kMostTriangles ||
+        mesh_.vertices.size() + places.size() > 3 * kMostTriangles)
+      refuse(fmt::format("has more than {} triangles", kMostTriangles), where, "Simplify the geometry");
     std::vector<std::uint32_t> corners;
     if (primitive.indices >= 0) {
       corners = indices_of(model_, primitive.indices, where);
     } else {
-      corners.resize(std::min(places.size(), 3 * kMostTriangles + 3));
+      corners.resize(places.size());
       for (std::size_t i = 0; i < corners.size(); ++i) corners[i] = static_cast<std::uint32_t>(i);
     }
     const std::size_t count = corners.size() / 3;
-    if (mesh_.triangles.size() + count > kMostTriangles ||
-        mesh_.vertices.size() + places.size() > 3 * kMostTriangles)
-      refuse(fmt::format("has more than {} triangles", kMostTriangles), where, "Simplify the geometry");
     const auto base = static_cast<std::uint32_t>(mesh_.vertices.size());
     for (std::size_t i = 0; i < places.size(); ++i) {
       const auto local = places.at<std::array<float, 3>>(i);
@@ -246,9 +246,11 @@ class GltfReader {
       mesh_.vertices.push_back(
           {static_cast<float>(world[0]), static_cast<float>(world[1]), static_cast<float>(world[2])});
     }
+    if (primitive.attributes.contains("COLOR_0")) notes_.insert("vertices' colours are left out");
+    add_normals(primitive, world_from_node.topLeftCorner<3, 3>(), base, where);
     std::uint32_t material = static_cast<std::uint32_t>(model_.materials.size());
     if (primitive.material >= 0) {
-      entry(model_.materials, primitive.material, "material");
+      add_texture_places(primitive, entry(model_.materials, primitive.material, "material"), base, where);
       material = static_cast<std::uint32_t>(primitive.material);
     }
     for (std::size_t t = 0; t < count; ++t) {
@@ -260,10 +262,68 @@ class GltfReader {
     }
   }
 
+  /// A primitive's attribute for each of its vertices, from `base` on; null where it hasn't got it.
+  [[nodiscard]] std::optional<Elements> attribute(const tinygltf::Primitive& primitive,
+                                                  const std::string& name, int type, std::size_t base,
+                                                  const std::string& where) const {
+    const auto at = primitive.attributes.find(name);
+    if (at == primitive.attributes.end()) return std::nullopt;
+    Elements elements(model_, at->second, type, where);
+    if (elements.size() != mesh_.vertices.size() - base)
+      refuse(fmt::format("{} isn't one for each vertex", name), where);
+    return elements;
+  }
+
+  void add_normals(const tinygltf::Primitive& primitive, const Eigen::Matrix3d& linear, std::size_t base,
+                   const std::string& where) {
+    const auto from = attribute(primitive, "NORMAL", TINYGLTF_TYPE_VEC3, base, where);
+    if (!from || from->kind() != TINYGLTF_COMPONENT_TYPE_FLOAT) return;
+    mesh_.normals.resize(mesh_.vertices.size());
+    // Cofactors: the inverse's transpose but for the scale, and there for flat matrices too.
+    Eigen::Matrix3d turns;
+    for (int a = 0; a < 3; ++a) turns.col(a) = linear.col((a + 1) % 3).cross(linear.col((a + 2) % 3));
+    for (std::size_t i = 0; i < from->size(); ++i) {
+      const auto local = from->at<std::array<float, 3>>(i);
+      const Eigen::Vector3d normal = turns * Eigen::Vector3f(local[0], local[1], local[2]).cast<double>();
+      const double length = normal.norm();
+      if (!std::isfinite(length) || !(length > 0)) continue;
+      for (std::size_t a = 0; a < 3; ++a)
+        mesh_.normals[base + i][a] = static_cast<float>(normal[static_cast<Eigen::Index>(a)] / length);
+    }
+  }
+
+  void add_texture_places(const tinygltf::Primitive& primitive, const tinygltf::Material& material,
+                          std::size_t base, const std::string& where) {
+    const tinygltf::TextureInfo& texture = material.pbrMetallicRoughness.baseColorTexture;
+    if (texture.index < 0) return;
+    const auto from =
+        attribute(primitive, fmt::format("TEXCOORD_{}", texture.texCoord), TINYGLTF_TYPE_VEC2, base, where);
+    mesh_.texture_places.resize(mesh_.vertices.size());
+    for (std::size_t i = 0; from && i < from->size(); ++i) {
+      std::array<float, 2>& to = mesh_.texture_places[base + i];
+      for (std::size_t a = 0; a < 2; ++a) to[a] = coordinate(*from, i, a, where);
+    }
+  }
+  static float coordinate(const Elements& from, std::size_t i, std::size_t a, const std::string& where) {
+    float value = 0;
+    if (from.kind() == TINYGLTF_COMPONENT_TYPE_FLOAT)
+      value = from.at<std::array<float, 2>>(i)[a];
+    else if (from.kind() == TINYGLTF_COMPONENT_TYPE_UNSIGNED_BYTE)
+      value = static_cast<float>(from.at<std::array<std::uint8_t, 2>>(i)[a]) / 255;
+    else if (from.kind() == TINYGLTF_COMPONENT_TYPE_UNSIGNED_SHORT)
+      value = static_cast<float>(from.at<std::array<std::uint16_t, 2>>(i)[a]) / 65535;
+    else
+      refuse("a place on a texture is of no known type", where);
+    if (!std::isfinite(value)) refuse("a place on a texture isn't finite", where);
+    return value;
+  }
+
   const tinygltf::Model& model_;
   Mesh& mesh_;
   std::vector<bool> seen_;
   std::uint32_t first_material_ = 0;
+  std::map<int, int> textures_;  // the mesh's number of each that is shown
+  std::size_t texels_ = 0;
   GltfScene scene_;
   std::set<std::string> notes_;
 };
@@ -279,9 +339,14 @@ std::string_view json_of(std::string_view bytes) {
 
 tinygltf::Model model_of(const std::string& bytes, const fs::path& file) {
   tinygltf::TinyGLTF loader;
-  loader.SetImageLoader([](tinygltf::Image*, int, std::string*, std::string*, int, int, const unsigned char*,
-                           int, void*) { return true; },
-                        nullptr);
+  // Pictures are kept as they are: those that are shown are decoded later, within bounds.
+  loader.SetImageLoader(
+      [](tinygltf::Image* image, int, std::string*, std::string*, int, int, const unsigned char* content,
+         int bytes_there, void*) {
+        image->image.assign(content, content + std::max(0, bytes_there));
+        return true;
+      },
+      nullptr);
   tinygltf::Model model;
   std::string error, warning;
   const std::string folder = fs::absolute(file).parent_path().string();

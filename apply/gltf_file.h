@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "apply/placement.h"
+#include "apply/texture.h"
 #include "base/quantity.h"
 #include "base/result.h"
 
@@ -17,7 +18,8 @@ namespace emberlock::apply {
 /// A surface that reflects evenly to all sides (Lambert), on both faces.
 struct Material {
   std::array<float, 3> albedo = {1, 1, 1};   ///< 0..1
-  std::array<float, 3> emitted = {0, 0, 0};  ///< radiance, grey levels; it lights nothing else
+  std::array<float, 3> emitted = {0, 0, 0};  ///< radiance to both sides, grey levels
+  int texture = -1;                          ///< a factor of the albedo; -1: none
 };
 
 /// Triangles in the world.
@@ -26,8 +28,13 @@ struct Mesh {
   std::vector<std::array<std::uint32_t, 3>> triangles;  ///< of vertices
   std::vector<std::uint32_t> material;                  ///< of each triangle
   std::vector<Material> materials;
+  std::vector<Texture> textures;
+  std::vector<std::array<float, 2>> texture_places;  ///< of each vertex; empty where there are no textures
+  std::vector<std::array<float, 3>>
+      normals;  ///< of each vertex, unit length, or 0: as its triangles; may be empty
 };
-inline constexpr std::size_t kMostTriangles = 5'000'000;
+inline constexpr std::size_t kMostTriangles = 10'000'000;
+inline constexpr std::size_t kMostTexels = std::size_t{1} << 28;
 
 /// What a glTF 2.0 file holds beside triangles. Its nodes are placed in the world.
 struct GltfScene {
@@ -45,11 +52,12 @@ struct GltfScene {
 };
 
 /// Adds the triangles of a .gltf or .glb file's scene to `mesh`, at their nodes' places. glTF's y axis
-/// becomes z, its z -y, as in Blender; then the file is placed. Of materials, the base colour's and the
-/// emission's factors count (KHR_materials_emissive_strength too). Textures, metal, transparency, normals,
-/// skins and animation are left out, which `notes` tell. Errors: bad_input: not glTF, a required extension, a
-/// missing or short buffer, indices out of range, a node that is reached twice (a cycle too), values that
-/// aren't finite, nothing but points or lines, more than kMostTriangles. `mesh` is undefined after an error.
+/// becomes z, its z -y, as in Blender; then the file is placed. Of materials, the base colour's factor and
+/// texture and the emission's factor count (KHR_materials_emissive_strength too). Vertices' normals are
+/// taken. Other textures, metal, transparency, skins and animation are left out, which `notes` tell. Errors:
+/// bad_input: not glTF, a required extension, a missing or short buffer or picture, pictures larger than
+/// kMostTexels in all, indices out of range, a node that is reached twice (a cycle too), values that aren't
+/// finite, more than kMostTriangles. `mesh` is undefined after an error.
 Result<GltfScene> read_gltf(const std::filesystem::path& file, const Placement& world_from_file, Mesh& mesh);
 /// The same of what the file holds; buffers beside it are looked for in its folder.
 Result<GltfScene> parse_gltf(const std::string& bytes, const std::filesystem::path& file,

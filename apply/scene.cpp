@@ -8,6 +8,7 @@
 
 #include <Eigen/Geometry>
 
+#include "apply/light_tables.h"
 #include "recon/calibrate/camera_path.h"
 
 namespace emberlock::apply {
@@ -94,26 +95,55 @@ Result<Scene> Scene::load(SceneFile file, int light_voxels, recon::Pool& pool) {
   return scene;
 }
 
+std::vector<const Flame*> Scene::burning() const {
+  std::vector<const Flame*> flames;
+  for (const Player& player : players_)
+    if (player.flame) flames.push_back(player.flame.get());
+  return flames;
+}
+
+Status Scene::light_flames(recon::Pool& pool) {
+  const std::vector<const Flame*> flames = burning();
+  int number = 0;
+  for (Player& player : players_) {
+    if (!player.flame) continue;
+    const LightTables tables(flames, file_.light);  // of those that were lit before too
+    const FallingLight<EmbreeTriangles, kMostFlames> falling{tables.view(), surfaces_.triangles()};
+    const auto shade = [&](const Eigen::Vector3d& place) {
+      const Eigen::Vector3f at = place.cast<float>();
+      return static_cast<double>(falling.outside_reaches({at[0], at[1], at[2]}, number));
+    };
+    EMBERLOCK_RETURN_IF_ERROR(player.flame->light_by(file_.light, player.placed.albedo, shade, pool));
+    ++number;
+  }
+  return {};
+}
+
 Status Scene::go_to(Seconds time, recon::Pool& pool) {
+  bool others = false;
   for (Player& player : players_) {
     const std::optional<std::size_t> now = frame_at(player.placed, player.frames.size(), time);
     if (now == player.shown && (player.flame || !now)) continue;
     player.shown = now;
     player.flame.reset();
+    others = true;
     if (!now) continue;
     EMBERLOCK_ASSIGN_OR_RETURN(recon::ShownVolume shown, recon::read_shown_volume(player.frames[*now]));
+    if (player.placed.albedo && shown.lighting.light.source == recon::Light::Source::none)
+      return Error{ErrorKind::bad_input, "wasn't reconstructed as lit from outside",
+                   player.frames[*now].string(),
+                   "Leave albedo away, or reconstruct it with --effects light=..."};
     player.flame = std::make_unique<Flame>(std::move(shown), player.placed.world_from_flame,
                                            player.placed.brightness, light_voxels_, pool);
   }
-  return {};
+  const bool lights =
+      file_.light.source != recon::Light::Source::none || file_.light.ambient != std::array<double, 3>{};
+  return others && lights ? light_flames(pool) : Status{};
 }
 
 ScenePicture Scene::picture(const recon::CameraModel& camera, const PictureOptions& options,
                             recon::Pool& pool) const {
-  std::vector<const Flame*> flames;
-  for (const Player& player : players_)
-    if (player.flame) flames.push_back(player.flame.get());
-  return scene_picture(flames, {surfaces_, file_.ambient, file_.background}, camera, options, pool);
+  return scene_picture(burning(), {surfaces_, file_.light, file_.background}, camera, options, pool);
 }
 
 Result<std::vector<recon::CameraModel>> Scene::cameras(ImageSize size, int frames) const {

@@ -33,6 +33,8 @@ class Scene {
   static Result<Scene> load(SceneFile file, int light_voxels, recon::Pool& pool);
 
   /// Reads the flames' frames for this time, seconds after the beginning, where they are others than before.
+  /// Errors: those of recon::read_shown_volume() and Flame::light_by(); an albedo of a result that no light
+  /// fell on.
   Status go_to(Seconds time, recon::Pool& pool);
   [[nodiscard]] ScenePicture picture(const recon::CameraModel& camera, const PictureOptions& options,
                                      recon::Pool& pool) const;
@@ -51,8 +53,10 @@ class Scene {
     PlacedResult placed;
     std::vector<std::filesystem::path> frames;
     std::optional<std::size_t> shown;
-    std::unique_ptr<const Flame> flame;  ///< of the frame that is shown
+    std::unique_ptr<Flame> flame;  ///< of the frame that is shown
   };
+  [[nodiscard]] std::vector<const Flame*> burning() const;
+  Status light_flames(recon::Pool& pool);
   Scene(SceneFile file, Surfaces surfaces) : file_(std::move(file)), surfaces_(std::move(surfaces)) {}
 
   SceneFile file_;

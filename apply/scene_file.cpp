@@ -1,15 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "apply/scene_file.h"
 
-#include <cmath>
 #include <numbers>
-#include <set>
 
 #include <Eigen/Geometry>
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
 #include "apply/gltf_file.h"
+#include "apply/json_fields.h"
+#include "apply/kernels/flame_table.h"
 #include "apply/unreadable.h"
 #include "base/file.h"
 #include "base/nesting.h"
@@ -18,94 +18,10 @@ namespace emberlock::apply {
 namespace {
 
 namespace fs = std::filesystem;
-using Json = nlohmann::json;
 
-constexpr double kFar = 1e6;
 constexpr double kDegree = std::numbers::pi / 180;
-constexpr std::size_t kMostFlames = 64;
 constexpr std::size_t kMostFiles = 256;
 constexpr std::size_t kMostStops = 10000;
-
-/// An object of the file, whose keys are asked for one by one; those that nobody asked for aren't known.
-class Fields {
- public:
-  Fields(const Json& json, std::string path) : json_(json), path_(std::move(path)) {
-    if (!json.is_object()) refuse("isn't an object", path_, "Write it in braces");
-  }
-  [[nodiscard]] std::string path(const std::string& key) const {
-    return path_.empty() ? key : path_ + "." + key;
-  }
-  const Json* find(const std::string& key) {
-    asked_.insert(key);
-    const auto at = json_.find(key);
-    return at == json_.end() ? nullptr : &*at;
-  }
-  const Json& need(const std::string& key) {
-    const Json* const found = find(key);
-    if (found == nullptr) refuse("is missing", path(key));
-    return *found;
-  }
-  double number(const std::string& key, double otherwise, double least, double most) {
-    const Json* const found = find(key);
-    return found == nullptr ? otherwise : number_in(*found, path(key), least, most);
-  }
-  /// Three numbers in an array.
-  Eigen::Vector3d three(const std::string& key, double least, double most) {
-    const Json* const found = find(key);
-    return found == nullptr ? Eigen::Vector3d::Zero() : three_in(*found, path(key), least, most);
-  }
-  Eigen::Vector3d place(const std::string& key) { return three_in(need(key), path(key), -kFar, kFar); }
-  std::string word(const std::string& key, const std::vector<std::string>& words) {
-    const Json* const found = find(key);
-    if (found == nullptr) return words.front();
-    for (const std::string& w : words)
-      if (*found == w) return w;
-    refuse("isn't known", path(key), fmt::format("Give {}", fmt::join(words, ", ")));
-  }
-  fs::path file(const std::string& key, const fs::path& folder) {
-    const Json& found = need(key);
-    if (!found.is_string() || found.get_ref<const std::string&>().empty()) refuse("isn't a path", path(key));
-    const auto& name = found.get_ref<const std::string&>();
-    if (name.find('\0') != std::string::npos) refuse("isn't a path", path(key));
-    return folder / name;
-  }
-  void finish() const {
-    for (const auto& [key, value] : json_.items())
-      if (!asked_.contains(key))
-        refuse("isn't known", path(key), fmt::format("Known here are {}", fmt::join(asked_, ", ")));
-  }
-
- private:
-  static double number_in(const Json& json, const std::string& key, double least, double most) {
-    if (!json.is_number()) refuse("isn't a number", key);
-    const double value = json.get<double>();
-    if (!(value >= least && value <= most))
-      refuse("is out of range", key, fmt::format("Give {:g} to {:g}", least, most));
-    return value;
-  }
-  static Eigen::Vector3d three_in(const Json& json, const std::string& key, double least, double most) {
-    if (!json.is_array() || json.size() != 3) refuse("isn't three numbers", key, "Give [x, y, z]");
-    Eigen::Vector3d out;
-    for (int a = 0; a < 3; ++a) out[a] = number_in(json[static_cast<std::size_t>(a)], key, least, most);
-    return out;
-  }
-
-  const Json& json_;
-  std::string path_;
-  std::set<std::string> asked_;
-};
-
-/// Calls act(fields) for each object of an array, and says that nothing else is known in it.
-template <class Act>
-void each_of(const Json& json, const std::string& key, std::size_t most, const Act& act) {
-  if (!json.is_array()) refuse("isn't an array", key, "Write it in brackets");
-  if (json.size() > most) refuse(fmt::format("has more than {} entries", most), key);
-  for (std::size_t i = 0; i < json.size(); ++i) {
-    Fields fields(json[i], fmt::format("{}[{}]", key, i));
-    act(fields);
-    fields.finish();
-  }
-}
 
 Placement placement_of(Fields& fields) {
   constexpr double kTurns = 3600;
@@ -127,6 +43,7 @@ PlacedResult flame_of(Fields& fields, const fs::path& folder) {
   const std::string mirror = fields.word("mirror", {"none", "x", "y", "z"});
   if (mirror != "none") flame.world_from_flame.rotation.col(mirror.front() - 'x') *= -1;
   flame.brightness = fields.number("brightness", 1, 0, kFar);
+  if (fields.find("albedo") != nullptr) flame.albedo = fields.number("albedo", 1, 0, 1);
   flame.shift = Seconds(fields.number("shift", 0, -kFar, kFar));
   flame.rate = Hertz(fields.number("rate", 24, 1e-3, 1e4));
   if (fields.word("frames", {"loop", "once"}) == "once") flame.frames = PlacedResult::Frames::once;
@@ -169,6 +86,21 @@ std::array<double, 3> colour(Fields& fields, const char* key) {
   return {rgb[0], rgb[1], rgb[2]};
 }
 
+/// The lamp or sun of a scene.
+void read_light(Fields& fields, recon::Light& light) {
+  const bool nearby = fields.find("at") != nullptr;
+  if (nearby && fields.find("towards") != nullptr)
+    refuse("has both at and towards", "light", "Give one of them");
+  light.source = nearby ? recon::Light::Source::nearby : recon::Light::Source::distant;
+  const Eigen::Vector3d place = fields.place(nearby ? "at" : "towards");
+  if (!nearby && !(place.norm() > 0)) refuse("is no direction", "light.towards");
+  light.place = {place[0], place[1], place[2]};
+  fields.need("level");
+  light.strength = colour(fields, "level");
+  for (double& level : light.strength)
+    level /= 4;  // scattered evenly, over a white surface's: 1 / (4 pi) to 1 / pi
+}
+
 SceneFile scene_of(const Json& json, const fs::path& folder) {
   Fields fields(json, "");
   if (fields.need("format") != "emberlock scene")
@@ -187,7 +119,12 @@ SceneFile scene_of(const Json& json, const fs::path& folder) {
     scene.camera = camera_of(of_camera);
     of_camera.finish();
   }
-  scene.ambient = colour(fields, "ambient");
+  if (const Json* const light = fields.find("light")) {
+    Fields of_light(*light, "light");
+    read_light(of_light, scene.light);
+    of_light.finish();
+  }
+  scene.light.ambient = colour(fields, "ambient");
   scene.background = colour(fields, "background");
   fields.finish();
   return scene;
@@ -203,8 +140,11 @@ Result<SceneFile> scene_in_gltf(const fs::path& file) {
                     "file that names both",
                     kMostFlames)};
   SceneFile scene;
-  for (const GltfScene::Flame& flame : found.flames)
-    scene.flames.push_back({file.parent_path() / flame.result, flame.world_from_flame});
+  for (const GltfScene::Flame& flame : found.flames) {
+    PlacedResult& placed = scene.flames.emplace_back();
+    placed.result = file.parent_path() / flame.result;
+    placed.world_from_flame = flame.world_from_flame;
+  }
   scene.geometry.push_back({file, {}});
   if (found.cameras.empty()) return scene;
   const GltfScene::Camera& camera = found.cameras.front();

@@ -11,6 +11,7 @@
 #include "apply/placement.h"
 #include "base/quantity.h"
 #include "base/result.h"
+#include "recon/effects/effects.h"
 
 namespace emberlock::apply {
 
@@ -27,6 +28,9 @@ namespace emberlock::apply {
 //                                        is divided by it
 //                "mirror": "none",       x, y or z: that axis of the result is turned round, before all else
 //                "brightness": 1,        factor of its light
+//                "albedo": 0..1,         of smoke that was filmed in a light (--effects light=...): it takes
+//                the
+//                                        scene's instead, and scatters this share; if not given it keeps that
 //                "shift": 0,             s: it starts so much later
 //                "rate": 24,             of its frames, a second
 //                "frames": "loop"}],     or once: there is nothing before the first frame and after the last
@@ -38,14 +42,19 @@ namespace emberlock::apply {
 //              {"orbit": {"look_at": the middle of the flames, "distance": as far as they just fit,
 //                         "elevation": 10 degrees}};
 //              in each "field_of_view": 40 degrees of the shorter side, and "up": "z" (x, y, -x, -y, -z)
-//    "ambient": [0, 0, 0],               radiance from all sides that lights surfaces, never shaded
+//    "light": {"towards": [x, y, z],     the direction to the sun, or "at": a lamp's place
+//              "level": [r, g, b]},      radiance of a white surface that faces it, the lamp's from a metre:
+//              its
+//                                        irradiance / pi. Casts shadows; without this key there is none
+//    "ambient": [0, 0, 0],               radiance from all sides that lights surfaces and smoke, never shaded
 //    "background": [0, 0, 0]}            what is seen where nothing stands
 
 /// A flame in a scene.
 struct PlacedResult {
-  std::filesystem::path result;
+  std::filesystem::path result = {};
   Placement world_from_flame;
-  double brightness = 1;  ///< 0..1e6
+  double brightness = 1;         ///< 0..1e6
+  std::optional<double> albedo;  ///< 0..1
   Seconds shift{0};
   Hertz rate{24};  ///< > 0
   enum class Frames { loop, once };
@@ -74,7 +83,7 @@ struct SceneFile {
   std::vector<PlacedResult> flames;  ///< 1..64
   std::vector<PlacedFile> geometry;  ///< at most 256
   CameraPlan camera;
-  std::array<double, 3> ambient = {};     ///< grey levels
+  recon::Light light;                     ///< LightTables'
   std::array<double, 3> background = {};  ///< grey levels
 };
 

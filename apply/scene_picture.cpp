@@ -3,128 +3,73 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
-#include <numbers>
 
-#include "apply/ray_light.h"
-#include "apply/surface_light.h"
-#include "base/quantity.h"
-#include "base/random.h"
+#include "apply/bvh.h"
+#include "apply/kernels/trace_pixel.h"
+#include "apply/light_tables.h"
+#include "apply/scene_cuda.h"
+#include "recon/hull/kernel_views.h"
 
 namespace emberlock::apply {
 namespace {
 
-Eigen::Vector3d vector_of(const std::array<double, 3>& v) { return {v[0], v[1], v[2]}; }
-Eigen::Vector3d vector_of(const std::array<float, 3>& v) {
-  return Eigen::Vector3f(v[0], v[1], v[2]).cast<double>();
-}
-Eigen::Vector3d colour_of(const recon::Rgba& v) {
-  return Eigen::Vector3f(v.c[0], v.c[1], v.c[2]).cast<double>();
+Vec3 vec3_of(const Eigen::Vector3d& v) {
+  const Eigen::Vector3f f = v.cast<float>();
+  return {f[0], f[1], f[2]};
 }
 
-/// Places of a pixel's samples: the R2 sequence (Roberts 2018), shifted at random.
-class PlacesInPixel {
- public:
-  PlacesInPixel(std::uint64_t seed, std::uint64_t pixel) {
-    constexpr std::uint64_t kBeyondSamples = ~std::uint64_t{0};
-    for (std::uint64_t a = 0; a < 2; ++a) shift_[a] = random_uniform(seed, pixel, kBeyondSamples - a);
+PixelTask task_of(const Surroundings& around, const recon::CameraModel& camera, const PictureOptions& options,
+                  ScenePicture& picture) {
+  PixelTask task;
+  task.surfaces = around.surfaces.table();
+  task.camera = recon::pixel_rays(camera);
+  task.eye = vec3_of(camera.center());
+  task.background = vec3_of({around.background[0], around.background[1], around.background[2]});
+  task.samples = options.samples;
+  task.seed = options.seed;
+  task.bare = around.surfaces.empty();
+  task.rgb = picture.light.rgb.data();
+  task.opacity = picture.opacity.data();
+  task.error = picture.error.data();
+  return task;
+}
+
+/// What a GPU needs of the surfaces; a tree for those that aren't there yet.
+SurfaceWork surface_work(const Surfaces& surfaces, const Bvh& bvh) {
+  const Mesh& mesh = surfaces.mesh();
+  return {surfaces.table(),
+          mesh.vertices.size(),
+          mesh.triangles.size(),
+          surfaces.materials().size(),
+          surfaces.textures().size(),
+          surfaces.texels().size(),
+          bvh.view(),
+          bvh.nodes.size(),
+          &surfaces.on_gpu()};
+}
+
+void on_cuda(const std::vector<const Flame*>& flames, const std::vector<Flame::View>& views,
+             const LightTables& tables, const Surfaces& surfaces, const PixelTask& task, std::size_t pixels) {
+  std::vector<FlameWork> work;
+  for (std::size_t f = 0; f < flames.size(); ++f)
+    work.push_back({tables.flames[f], &views[f].rays, views[f].source, &flames[f]->coarse_shine(),
+                    &flames[f]->on_gpu()});
+  Bvh bvh;
+  if (!surfaces.on_gpu() && !surfaces.empty()) {
+    Result<Bvh> built = build_bvh(surfaces.mesh());
+    if (!built) throw recon::DeviceError(built.error());
+    bvh = std::move(built).value();
   }
-  [[nodiscard]] Eigen::Vector2d operator()(int sample) const {
-    constexpr double kAcross = 0.7548776662466927;
-    constexpr double kDown = 0.5698402909980532;
-    return {wrap_positive(shift_[0] + sample * kAcross, 1), wrap_positive(shift_[1] + sample * kDown, 1)};
-  }
+  trace_on_cuda(work, tables.view(), surface_work(surfaces, bvh), task, pixels);
+}
 
- private:
-  double shift_[2] = {};
-};
-
-class PixelTracer {
- public:
-  PixelTracer(const std::vector<const Flame*>& flames, const Surroundings& around,
-              const recon::CameraModel& camera, const PictureOptions& options, recon::Pool& pool)
-      : flames_(flames),
-        around_(around),
-        camera_(camera),
-        options_(options),
-        lights_(flames, around.surfaces) {
-    views_.reserve(flames.size());
-    for (const Flame* flame : flames) views_.push_back(flame->seen_by(camera, options.step, pool));
-  }
-
-  /// Rays of one thread.
-  struct Scratch {
-    RayLight seen;
-    SurfaceLight::Scratch surface;
-  };
-  void operator()(int x, int y, ScenePicture& picture, Scratch& scratch) const {
-    const std::size_t pixel =
-        static_cast<std::size_t>(y) * static_cast<std::size_t>(picture.light.size.width) +
-        static_cast<std::size_t>(x);
-    scratch.seen.clear();
-    for (std::size_t f = 0; f < flames_.size(); ++f) flames_[f]->add_steps(views_[f], pixel, scratch.seen);
-    scratch.seen.merge();
-    const Means means =
-        around_.surfaces.empty() ? without_surfaces(scratch.seen) : sampled(x, y, pixel, scratch);
-    for (std::size_t c = 0; c < 3; ++c)
-      picture.light.rgb[3 * pixel + c] = static_cast<float>(means.light[static_cast<Eigen::Index>(c)]);
-    picture.opacity[pixel] = static_cast<float>(std::clamp(means.opacity, 0.0, 1.0));
-    picture.error[pixel] = static_cast<float>(means.error);
-  }
-
- private:
-  struct Means {
-    Eigen::Vector3d light = Eigen::Vector3d::Zero();
-    double opacity = 0, error = 0;
-  };
-
-  [[nodiscard]] Means without_surfaces(const RayLight& flames) const {
-    const recon::Rgba all = flames.all();
-    const double through = static_cast<double>(all.c[3]);
-    return {colour_of(all) + through * vector_of(around_.background), 1 - through, 0};
-  }
-
-  [[nodiscard]] Means sampled(int x, int y, std::size_t pixel, Scratch& scratch) const {
-    const PlacesInPixel places(options_.seed, pixel);
-    Means means;
-    double mean = 0;
-    double squares = 0;  // of what differs from the mean (Welford 1962)
-    for (int i = 0; i < options_.samples; ++i) {
-      const recon::Ray ray = camera_.ray(Eigen::Vector2d(x, y) + places(i));
-      const std::optional<Surfaces::Hit> hit = around_.surfaces.first(ray.origin, ray.direction);
-      const recon::Rgba before =
-          hit ? scratch.seen.up_to(static_cast<float>(hit->distance)) : scratch.seen.all();
-      const double through = static_cast<double>(before.c[3]);
-      const Eigen::Vector3d behind = hit ? shine(ray.origin + hit->distance * ray.direction, *hit,
-                                                 {options_.seed, pixel, i, options_.samples}, scratch.surface)
-                                         : vector_of(around_.background);
-      const Eigen::Vector3d light = colour_of(before) + through * behind;
-      means.light += light;
-      means.opacity += hit ? 1 : 1 - through;
-      const double off = light.mean() - mean;
-      mean += off / (i + 1);
-      squares += off * (light.mean() - mean);
-    }
-    means.light /= options_.samples;
-    means.opacity /= options_.samples;
-    if (options_.samples > 1) means.error = std::sqrt(squares / (options_.samples - 1) / options_.samples);
-    return means;
-  }
-
-  [[nodiscard]] Eigen::Vector3d shine(const Eigen::Vector3d& place, const Surfaces::Hit& hit,
-                                      const SurfaceLight::Draw& draw, SurfaceLight::Scratch& scratch) const {
-    const Eigen::Vector3d falls =
-        lights_.sample(place, hit.normal, draw, scratch) / std::numbers::pi + vector_of(around_.ambient);
-    return vector_of(hit.material->emitted) + vector_of(hit.material->albedo).cwiseProduct(falls);
-  }
-
-  const std::vector<const Flame*>& flames_;
-  const Surroundings& around_;
-  const recon::CameraModel& camera_;
-  const PictureOptions& options_;
-  SurfaceLight lights_;
-  std::vector<Flame::View> views_;
-};
+template <class Trace>
+void on_cpu(const Trace& trace, ImageSize size, recon::Pool& pool) {
+  const auto width = static_cast<std::size_t>(size.width);
+  pool.run(size.height, [&](int y) {
+    for (std::size_t x = 0; x < width; ++x) trace(static_cast<std::size_t>(y) * width + x);
+  });
+}
 
 }  // namespace
 
@@ -135,20 +80,33 @@ ScenePicture scene_picture(const std::vector<const Flame*>& flames, const Surrou
   ScenePicture picture{recon::RadianceImage(size), {}, {}};
   picture.opacity.resize(picture.light.rgb.size() / 3);
   picture.error.resize(picture.opacity.size());
-  const PixelTracer trace(flames, around, camera, options, pool);
-  constexpr int kRows = 4;  // a task: what it allocates for its rays is then nothing
-  pool.run((size.height + kRows - 1) / kRows, [&](int task) {
-    PixelTracer::Scratch scratch;
-    for (int y = kRows * task; y < std::min(size.height, kRows * (task + 1)); ++y)
-      for (int x = 0; x < size.width; ++x) trace(x, y, picture, scratch);
-  });
+  LightTables tables(flames, around.light, around.surfaces.glowing());
+  std::vector<Flame::View> views;
+  views.reserve(flames.size());
+  for (std::size_t f = 0; f < flames.size(); ++f) {
+    views.push_back(flames[f]->seen_by(camera, options.step, pool));
+    tables.flames[f] = flames[f]->table(views[f]);
+  }
+  const PixelTask task = task_of(around, camera, options, picture);
+  if constexpr (recon::kCudaBuilt) {
+    if (pool.device() == recon::Device::cuda) {
+      on_cuda(flames, views, tables, around.surfaces, task, picture.opacity.size());
+      return picture;
+    }
+  }
+  constexpr int kFew = 4;  // for whom less memory is touched
+  const EmbreeTriangles triangles = around.surfaces.triangles();
+  if (flames.size() <= kFew)
+    on_cpu(TracePixel<EmbreeTriangles, kFew>{task, {tables.view(), triangles}}, size, pool);
+  else
+    on_cpu(TracePixel<EmbreeTriangles, kMostFlames>{task, {tables.view(), triangles}}, size, pool);
   return picture;
 }
 
 double rms_error(const ScenePicture& picture) {
-  double sum = 0;
-  for (const float e : picture.error) sum += static_cast<double>(e) * static_cast<double>(e);
-  return picture.error.empty() ? 0 : std::sqrt(sum / static_cast<double>(picture.error.size()));
+  double sum_of_squares = 0;
+  for (const float e : picture.error) sum_of_squares += static_cast<double>(e) * static_cast<double>(e);
+  return picture.error.empty() ? 0 : std::sqrt(sum_of_squares / static_cast<double>(picture.error.size()));
 }
 
 }  // namespace emberlock::apply

@@ -9,25 +9,30 @@
 #include "apply/surfaces.h"
 #include "recon/calibrate/camera_model.h"
 #include "recon/compute/pool.h"
+#include "recon/effects/effects.h"
 #include "recon/preprocess/radiance_image.h"
 
 namespace emberlock::apply {
 
 // The picture of flames among surfaces. Through each pixel's centre all flames are marched at once
-// (ray_light.h); samples through places within the pixel meet surfaces at distances z and shine by
-//   L = L_flames(z) + T_flames(z) (emitted + albedo (E / pi + ambient))
-// with one random sample of the irradiance E each (surface_light.h). So flames have no noise: without
-// surfaces a picture is that of render_view(), and what isn't exact then is the difference between the light
-// of a flame at a pixel's centre and its mean over the pixel, as there.
+// (kernels/merged_light.h); samples through places within the pixel meet surfaces at distances z and shine by
+//   L = L_flames(z) + T_flames(z) (emitted + albedo (E / pi + outside))
+// with one random sample of the irradiance E of flames and of surfaces that glow each
+// (kernels/surface_light.h), and the light from outside as it falls there (light_tables.h). So flames have no
+// noise: without surfaces a picture is that of render_view(), and what isn't exact then is the difference
+// between the light of a flame at a pixel's centre and its mean over the pixel, as there.
 //
-// Not simulated: light from surface to surface, light that surfaces emit or that smoke scatters onto others
-// (a flame's own in-scatter is shown to cameras), light of one flame scattered by another's smoke, mirrors,
-// glass, textures, rays bent by hot gas, the shutter's time.
+// Smoke scatters the light from outside (Flame::light_by()), in which surfaces and other smoke shade it, and
+// what it scatters falls on surfaces.
+//
+// Not simulated: light from surface to surface, light that surfaces emit onto smoke, a flame's in-scatter
+// onto surfaces (it is shown to cameras), light of one flame scattered by another's smoke, shade in the light
+// from all sides, mirrors, glass, rays bent by hot gas, the shutter's time.
 
 /// What stands around flames.
 struct Surroundings {
   const Surfaces& surfaces;
-  std::array<double, 3> ambient = {};     ///< grey levels
+  recon::Light light = {};                ///< LightTables'
   std::array<double, 3> background = {};  ///< grey levels
 };
 

@@ -2,24 +2,29 @@
 #pragma once
 
 #include <memory>
-#include <optional>
-
-#include <Eigen/Core>
 
 #include "apply/gltf_file.h"
+#include "apply/kernels/surface.h"
+#include "apply/kernels/surface_light.h"
 #include "base/result.h"
+
+struct RTCSceneTy;
 
 namespace emberlock::apply {
 
-/// A mesh that rays are cast through (Embree 3). Functions may be called by several threads.
+/// Triangles of Embree 3; as BvhTriangles.
+struct EmbreeTriangles {
+  RTCSceneTy* scene = nullptr;  ///< null: no triangles
+
+  [[nodiscard]] TriangleHit first(const Vec3& origin, const Vec3& direction, float nearest) const;
+  [[nodiscard]] bool blocked(const Vec3& origin, const Vec3& direction, float from, float to) const;
+};
+
+struct SurfacesOnGpu;
+
+/// A mesh that rays are cast at. Functions may be called by several threads.
 class Surfaces {
  public:
-  struct Hit {
-    double distance;         ///< along the ray, metres
-    Eigen::Vector3d normal;  ///< of the triangle, unit length, towards where the ray came from
-    const Material* material;
-  };
-
   /// Error (device): Embree can't be started, or memory is short.
   static Result<Surfaces> build(Mesh mesh);
   Surfaces(Surfaces&&) noexcept;
@@ -27,17 +32,25 @@ class Surfaces {
   ~Surfaces();
 
   [[nodiscard]] bool empty() const;
-  /// The first triangle that a ray meets farther than `nearest` metres; the direction has unit length.
-  [[nodiscard]] std::optional<Hit> first(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction,
-                                         double nearest = 0) const;
-  /// Whether a triangle stands between two distances of a ray.
-  [[nodiscard]] bool blocked(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction, double from,
-                             double to) const;
+  [[nodiscard]] const Mesh& mesh() const;
+  [[nodiscard]] EmbreeTriangles triangles() const;
+  /// Valid as long as this lives.
+  [[nodiscard]] SurfaceTable table() const;
+  /// Of the table.
+  [[nodiscard]] const std::vector<MaterialRow>& materials() const;
+  [[nodiscard]] const std::vector<TextureRow>& textures() const;
+  [[nodiscard]] const std::vector<std::uint8_t>& texels() const;
+  /// Those whose material shines.
+  [[nodiscard]] const std::vector<GlowingTriangle>& glowing() const;
+
+  /// What it keeps in a GPU's memory from picture to picture (scene_cuda.h).
+  [[nodiscard]] std::shared_ptr<SurfacesOnGpu>& on_gpu() const { return on_gpu_; }
 
  private:
-  struct Embree;
-  explicit Surfaces(std::unique_ptr<Embree> embree);
-  std::unique_ptr<Embree> embree_;
+  struct Parts;
+  explicit Surfaces(std::unique_ptr<Parts> parts);
+  std::unique_ptr<Parts> parts_;
+  mutable std::shared_ptr<SurfacesOnGpu> on_gpu_;
 };
 
 }  // namespace emberlock::apply

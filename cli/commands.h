@@ -19,6 +19,8 @@ void add_view(CLI::App& app);
 void add_measure(CLI::App& app);
 void add_render(CLI::App& app);
 void add_scene(CLI::App& app);
+void add_stylize(CLI::App& app);
+void add_ar(CLI::App& app);
 void add_export(CLI::App& app);
 void add_tradeoff(CLI::App& app);
 /// `evaluate paper`.

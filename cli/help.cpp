@@ -34,7 +34,9 @@ const std::vector<VerbGroup>& verb_groups() {
        {"status", "watch", "console", "strobe", "align", "record", "sessions", "jobs"}},
       {"Cameras", {"devices", "smear", "calibrate"}},
       {"Films of other cameras", {"verify", "import"}},
-      {"Volumes", {"reconstruct", "view", "render", "scene", "export", "measure", "tradeoff", "evaluate"}}};
+      {"Volumes",
+       {"reconstruct", "view", "render", "scene", "ar", "stylize", "export", "measure", "tradeoff",
+        "evaluate"}}};
   return groups;
 }
 

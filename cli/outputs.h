@@ -19,6 +19,8 @@ inline constexpr OutputVerb kTradeoffRig{"tradeoff rig"};
 inline constexpr OutputVerb kMeasure{"measure"};
 inline constexpr OutputVerb kRender{"render"};
 inline constexpr OutputVerb kScene{"scene"};
+inline constexpr OutputVerb kStylize{"stylize"};
+inline constexpr OutputVerb kAr{"ar"};
 inline constexpr OutputVerb kExport{"export"};
 inline constexpr OutputVerb kVerify{"verify"};
 inline constexpr OutputVerb kDemo{"demo"};

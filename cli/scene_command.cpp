@@ -34,6 +34,7 @@ struct SceneArguments {
   std::uint64_t seed = 1;
   double brightness = 1;
   bool transparent = false;
+  std::string device = "auto";
   int threads = 0;
 };
 
@@ -104,7 +105,9 @@ Status draw_scene(const SceneArguments& a) try {
   EMBERLOCK_RETURN_IF_ERROR(OutputFolder::check(request));
   constexpr int kAlongPath = 96;
   const bool moves = file.camera.stops.size() != 1;
-  recon::Pool pool(a.threads);
+  EMBERLOCK_ASSIGN_OR_RETURN(recon::Device device, recon::parse_device(a.device));
+  EMBERLOCK_ASSIGN_OR_RETURN(device, recon::resolve(device));
+  recon::Pool pool(a.threads, device);
   EMBERLOCK_ASSIGN_OR_RETURN(apply::Scene scene, apply::Scene::load(file, a.light_voxels, pool));
   EMBERLOCK_ASSIGN_OR_RETURN(const std::vector<recon::CameraModel> path,
                              scene.cameras(size, a.frames.value_or(moves ? kAlongPath : 1)));
@@ -123,6 +126,8 @@ Status draw_scene(const SceneArguments& a) try {
   std::printf("%-16s %s\n", "noise", words(noise, a.samples).c_str());
   std::printf("%-16s %s\n", "written to", a.out.c_str());
   return {};
+} catch (const recon::DeviceError& e) {
+  return e.error();
 } catch (const std::bad_alloc&) {
   return Error{ErrorKind::bad_input, "not enough memory", a.scene, "Give smaller pictures, or less geometry"};
 }
@@ -161,6 +166,8 @@ void add_scene(CLI::App& app) {
       ->capture_default_str();
   verb->add_flag("--transparent", a.transparent, "PNG before nothing instead of the background");
   verb->add_option("--brightness", a.brightness, "Factor of all light")->capture_default_str();
+  verb->add_option("--device", a.device, "auto, cpu, cuda, or cuda:N: the GPU of this number")
+      ->capture_default_str();
   verb->add_option("--threads", a.threads, "CPU threads; 0: one per core")
       ->check(CLI::Range(0, 256))
       ->capture_default_str();

@@ -27,8 +27,9 @@ namespace {
 namespace fs = std::filesystem;
 using nlohmann::json;
 
-/// Of pictures in the page: what two or three beside each other show on a screen.
-constexpr ImageSize kPictureSize{480, 480};
+/// Of pictures in the page: what two or three beside each other show on a screen, and of sequences, which
+/// have many, less.
+constexpr ImageSize kPictureSize{480, 480}, kPictureOfMany{320, 320};
 
 /// report.json of a volume's folder; null where there is none that can be read.
 json report_of(const fs::path& folder) {
@@ -71,18 +72,18 @@ std::vector<report::ViewerTrace> trace_of(const json& told) {
   return trace;
 }
 
-std::string picture_uri(const Image& picture) {
-  const Image small = report::scaled_into(picture, kPictureSize);
+std::string picture_uri(const Image& picture, ImageSize within) {
+  const Image small = report::scaled_into(picture, within);
   const auto bytes = recon::to_jpeg(small.view());
   return bytes ? report::data_uri("image/jpeg", *bytes) : report::png_data_uri(small);
 }
 
 /// A view's picture as the result has it; empty where it isn't there or of another size.
-std::string rendered_uri(const fs::path& folder, std::size_t view, ImageSize size) {
+std::string rendered_uri(const fs::path& folder, std::size_t view, ImageSize size, ImageSize within) {
   const auto picture = session::read_image(folder / "views" / fmt::format("{:04}.png", view));
   const bool fits =
       picture && picture->layout().size == size && picture->layout().format == PixelFormat::rgb8;
-  return fits ? picture_uri(*picture) : std::string();
+  return fits ? picture_uri(*picture, within) : std::string();
 }
 
 /// What `views` of a report.json tells of the nth view; null where it tells nothing.
@@ -92,9 +93,14 @@ json told_view(const json& told, std::size_t n) {
   return has ? (*views)[n] : json::object();
 }
 
-/// The cameras of the first volume and what they saw of it.
-Status add_cameras(report::ViewerPage& page, const ResultVolume& volume, const json& told,
-                   const recon::Grid& grid, const ViewerOptions& options) {
+/// The cameras that filmed a volume, and what each saw of it.
+struct Filmed {
+  std::vector<report::ViewerCamera> cameras;
+  std::vector<report::ViewerView> views;
+};
+
+Result<Filmed> filmed(const ResultVolume& volume, const recon::Grid& grid, const ViewerOptions& options,
+                      ImageSize within) {
   const fs::path folder = volume.file.parent_path();
   const std::string input = options.input.empty() ? reported(folder, "input") : options.input;
   if (input.empty())
@@ -105,16 +111,18 @@ Status add_cameras(report::ViewerPage& page, const ResultVolume& volume, const j
   if (volume.frame) scene_options.frame = static_cast<std::size_t>(*volume.frame);
   if (!options.rig.empty()) scene_options.rig = options.rig;
   EMBERLOCK_ASSIGN_OR_RETURN(const recon::Scene scene, recon::load_scene(input, scene_options));
+  const json told = report_of(folder);
+  Filmed all;
   for (std::size_t n = 0; n < scene.views.size(); ++n) {
     const recon::View& view = scene.views[n];
     const json about = told_view(told, n);
     const auto role = about.find("role");
     const bool held_out = role != about.end() && *role == "held_out";
-    page.add_camera({view.name, held_out ? recon::ViewRole::held_out : view.role, view.camera,
-                     channels_at(about, "rmse"), picture_uri(recon::to_rgb8(*view.image)),
-                     rendered_uri(folder, n, view.image->size)});
+    all.cameras.push_back({view.name, held_out ? recon::ViewRole::held_out : view.role, view.camera});
+    all.views.push_back({channels_at(about, "rmse"), picture_uri(recon::to_rgb8(*view.image), within),
+                         rendered_uri(folder, n, view.image->size, within)});
   }
-  return {};
+  return all;
 }
 
 }  // namespace
@@ -137,25 +145,31 @@ Result<std::string> viewer_html(const fs::path& result, const std::vector<Result
                                 const ViewerOptions& options, const report::ViewerProgram& program) {
   const ResultVolume& first = volumes.front();
   const fs::path folder = first.file.parent_path();
-  const json told = report_of(folder);
   EMBERLOCK_ASSIGN_OR_RETURN(const Eigen::Vector3d up, up_axis("", first.file));
   const std::string name = fs::absolute(result).lexically_normal().filename().string();
   report::ViewerPage page("Emberlock: " + (name.empty() ? result.string() : name),
                           reported(first.file, "input"), up, options.stored);
-  std::optional<recon::Grid> grid;
+  const ImageSize within = volumes.size() > 1 ? kPictureOfMany : kPictureSize;
+  std::vector<report::ViewerCamera> cameras;
+  std::optional<Error> amiss;
   const Progress bar = progress_bar("view");
   for (std::size_t n = 0; n < volumes.size(); ++n) {
     tell(bar, static_cast<double>(n) / static_cast<double>(volumes.size()), volumes[n].file.string());
     EMBERLOCK_ASSIGN_OR_RETURN(recon::SharedVolume volume, recon::read_shared_volume(volumes[n].file));
     volume.provenance.frame = volumes[n].frame;
-    if (!grid) grid = volume.grid;
-    EMBERLOCK_RETURN_IF_ERROR(page.add_frame(volume));
+    Result<Filmed> seen = filmed(volumes[n], volume.grid, options, within);
+    if (!seen && !amiss) amiss = seen.error();
+    if (seen && cameras.empty()) cameras = std::move(seen->cameras);
+    const bool fits = seen && seen->views.size() == cameras.size();
+    EMBERLOCK_RETURN_IF_ERROR(
+        page.add_frame(volume, fits ? std::move(seen->views) : std::vector<report::ViewerView>()));
   }
-  page.set_trace(trace_of(told));
-  if (const Status cameras = add_cameras(page, first, told, *grid, options); !cameras.ok()) {
-    const Error& e = cameras.error();
-    std::fprintf(stderr, "%-16s no cameras are shown: %s %s\n", "warning", e.where.c_str(), e.what.c_str());
-  }
+  if (amiss)
+    std::fprintf(stderr, "%-16s %s: %s %s\n", "warning",
+                 cameras.empty() ? "no cameras are shown" : "not all frames have their views",
+                 amiss->where.c_str(), amiss->what.c_str());
+  page.set_trace(trace_of(report_of(folder)));
+  for (report::ViewerCamera& camera : cameras) page.add_camera(std::move(camera));
   tell(bar, 1, "done");
   return page.html(program);
 }

@@ -111,10 +111,16 @@ json camera_json(const ViewerCamera& c) {
           {"focal", json::array({k.fx, k.fy})},
           {"middle", json::array({k.cx, k.cy})},
           {"rotation", std::move(rotation)},
-          {"translation", triple(c.camera.camera_from_world.translation)},
-          {"rmse", c.rmse ? json(*c.rmse) : json()},
-          {"captured", picture_or_null(c.captured)},
-          {"rendered", picture_or_null(c.rendered)}};
+          {"translation", triple(c.camera.camera_from_world.translation)}};
+}
+
+json views_json(const std::vector<ViewerView>& views) {
+  json told = json::array();
+  for (const ViewerView& v : views)
+    told.push_back({{"rmse", v.rmse ? json(*v.rmse) : json()},
+                    {"captured", picture_or_null(v.captured)},
+                    {"rendered", picture_or_null(v.rendered)}});
+  return told;
 }
 
 /// Text inside of a <script> or <style>: nothing in it ends the element.
@@ -142,11 +148,11 @@ Result<PackedGrid> packed(const recon::Grid& grid, const recon::SharedGrid& valu
                     std::ldexp(1.0, exponent)};
 }
 
-Status ViewerPage::add_frame(const recon::SharedVolume& volume) {
+Status ViewerPage::add_frame(const recon::SharedVolume& volume, std::vector<ViewerView> views) {
   if (volume.find("emission") == nullptr)
     return Error{ErrorKind::bad_input, "has no emission", "volume",
                  "Name a result of `emberlock reconstruct`"};
-  Frame frame{volume.grid, volume.provenance.frame, {}};
+  Frame frame{volume.grid, volume.provenance.frame, {}, std::move(views)};
   std::vector<std::string> blocks;
   for (const recon::SharedGrid& grid : volume.grids) {
     const bool tells = std::any_of(grid.values.begin(), grid.values.end(), [](float v) { return v != 0; });
@@ -179,7 +185,8 @@ std::string ViewerPage::header() const {
                       {"edge", f.grid.edge},
                       {"origin", triple(static_cast<double>(at[0]), static_cast<double>(at[1]),
                                         static_cast<double>(at[2]))},
-                      {"channels", std::move(channels)}});
+                      {"channels", std::move(channels)},
+                      {"views", views_json(f.views)}});
   }
   json& cameras = told["cameras"] = json::array();
   for (const ViewerCamera& camera : cameras_) cameras.push_back(camera_json(camera));

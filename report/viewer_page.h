@@ -34,12 +34,15 @@ struct PackedGrid {
 /// Error (bad_input): values that aren't finite, or not one or three a key point.
 Result<PackedGrid> packed(const recon::Grid& grid, const recon::SharedGrid& values, Stored stored);
 
-/// A camera that filmed, and its view as captured and as rendered: `data:` URIs of pictures of one size, or
-/// empty.
+/// A camera that filmed.
 struct ViewerCamera {
   std::string name;
   recon::ViewRole role = recon::ViewRole::input;
   recon::CameraModel camera;
+};
+
+/// What it saw of a frame, as captured and as rendered: `data:` URIs of pictures of one size, or empty.
+struct ViewerView {
   std::optional<std::array<double, 3>> rmse = {};  ///< R, G, B, grey levels
   std::string captured = {}, rendered = {};
 };
@@ -63,9 +66,9 @@ class ViewerPage {
   ViewerPage(std::string title, std::string input, const Eigen::Vector3d& up, Stored stored)
       : title_(std::move(title)), input_(std::move(input)), up_(up), stored_(stored) {}
 
-  /// The next frame: `emission`, and all other grids that hold anything. Errors: those of packed(); it has no
-  /// `emission`.
-  Status add_frame(const recon::SharedVolume& volume);
+  /// The next frame: `emission`, and all other grids that hold anything; what each camera saw of it, or
+  /// nothing. Errors: those of packed(); it has no `emission`.
+  Status add_frame(const recon::SharedVolume& volume, std::vector<ViewerView> views = {});
   void add_camera(ViewerCamera camera) { cameras_.push_back(std::move(camera)); }
   void set_trace(std::vector<ViewerTrace> trace) { trace_ = std::move(trace); }
   [[nodiscard]] std::string html(const ViewerProgram& program) const;
@@ -80,6 +83,7 @@ class ViewerPage {
     recon::Grid grid;
     std::optional<std::uint64_t> number;
     std::vector<Channel> channels;
+    std::vector<ViewerView> views;
   };
   [[nodiscard]] std::string header() const;
 

@@ -168,6 +168,15 @@ void Descent::begin_anew() {
   last_error_ = std::numeric_limits<double>::infinity();
 }
 
+void Descent::see_anew() {
+  guard_ = Guard(std::max(black_error(), judge()));
+  engine_->mark();
+  engine_->keep();
+  length_ = 1;
+  momentum_time_ = 1;
+  last_error_ = std::numeric_limits<double>::infinity();
+}
+
 Guard::Finding Descent::pass() {
   engine_->mark();  // what this pass judges: its own steps are judged by the next
   engine_->stiffen(stiffness_, soft_);

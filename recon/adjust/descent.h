@@ -83,6 +83,9 @@ class Descent {
   /// What the rays show besides the volume's light has changed (Engine::set_offset): earlier errors say
   /// nothing.
   void begin_anew();
+  /// The rays' pictures have changed, or x has been set: what x shows of them now is the limit, or no light
+  /// where that is worse; the next steps are full ones.
+  void see_anew();
   /// Judges x itself, which no pass has yet, by all of the level's rays (engine().residuals()); fit_error().
   double judge();
   /// Whether the guard has nothing against such an error.

@@ -40,6 +40,13 @@ ProblemPicture picture_of(const View& view, const Background& background) {
   return picture;
 }
 
+std::vector<ProblemPicture> pictures_of(const std::vector<const View*>& views, const Background& background) {
+  std::vector<ProblemPicture> pictures;
+  pictures.reserve(views.size());
+  for (const View* view : views) pictures.push_back(picture_of(*view, background));
+  return pictures;
+}
+
 void read_pixels(Problem& problem, Pool& pool) {
   const std::vector<ViewPixels> views = problem.view_pixels();
   problem.seen.resize(problem.rays());
@@ -105,10 +112,8 @@ Problem make_problem(const std::vector<const View*>& views, const Hull& hull, co
   problem.is_before_background = options.background.kind != Background::Kind::black;
   std::vector<const CameraModel*> cameras;
   cameras.reserve(views.size());
-  for (const View* view : views) {
-    cameras.push_back(&view->camera);
-    problem.pictures.push_back(picture_of(*view, options.background));
-  }
+  for (const View* view : views) cameras.push_back(&view->camera);
+  problem.pictures = pictures_of(views, options.background);
   RayListOptions clip;
   clip.step = static_cast<float>(options.step);
   clip.subsets = options.subsets;
@@ -136,6 +141,12 @@ Problem make_problem(const std::vector<const View*>& views, const Hull& hull, co
     problem.slabs[static_cast<std::size_t>(subset)] = sort_into_slabs(problem, subset);
   });
   return problem;
+}
+
+void show_pictures(Problem& problem, const std::vector<const View*>& views, const Background& background,
+                   Pool& pool) {
+  problem.pictures = pictures_of(views, background);
+  read_pixels(problem, pool);
 }
 
 }  // namespace emberlock::recon

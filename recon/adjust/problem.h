@@ -82,4 +82,9 @@ struct ProblemOptions {
 Problem make_problem(const std::vector<const View*>& views, const Hull& hull, const ProblemOptions& options,
                      Pool& pool);
 
+/// The problem's rays see other pictures from here on, of the same cameras and sizes. Its rays must be in the
+/// CPU's memory; a CPU engine heeds it at once.
+void show_pictures(Problem& problem, const std::vector<const View*>& views, const Background& background,
+                   Pool& pool);
+
 }  // namespace emberlock::recon

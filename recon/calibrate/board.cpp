@@ -11,6 +11,9 @@
 #include <opencv2/calib3d.hpp>
 #include <opencv2/imgproc.hpp>
 
+#include "recon/calibrate/marker_dictionary.h"
+#include "recon/calibrate/markers.h"
+
 namespace emberlock::recon {
 namespace {
 
@@ -21,26 +24,6 @@ constexpr int kMostSquares = 100;     // per side
 constexpr const char* kBoardFormats =
     "Give chessboard:COLUMNSxROWS:SQUARE in inner corners (chessboard:9x6:25mm), or "
     "charuco:COLUMNSxROWS:SQUARE:MARKER:DICTIONARY in squares (charuco:11x8:30mm:22mm:5X5_100)";
-
-constexpr std::array<std::pair<const char*, cv::aruco::PREDEFINED_DICTIONARY_NAME>, 17> kDictionaries = {{
-    {"4X4_50", cv::aruco::DICT_4X4_50},
-    {"4X4_100", cv::aruco::DICT_4X4_100},
-    {"4X4_250", cv::aruco::DICT_4X4_250},
-    {"4X4_1000", cv::aruco::DICT_4X4_1000},
-    {"5X5_50", cv::aruco::DICT_5X5_50},
-    {"5X5_100", cv::aruco::DICT_5X5_100},
-    {"5X5_250", cv::aruco::DICT_5X5_250},
-    {"5X5_1000", cv::aruco::DICT_5X5_1000},
-    {"6X6_50", cv::aruco::DICT_6X6_50},
-    {"6X6_100", cv::aruco::DICT_6X6_100},
-    {"6X6_250", cv::aruco::DICT_6X6_250},
-    {"6X6_1000", cv::aruco::DICT_6X6_1000},
-    {"7X7_50", cv::aruco::DICT_7X7_50},
-    {"7X7_100", cv::aruco::DICT_7X7_100},
-    {"7X7_250", cv::aruco::DICT_7X7_250},
-    {"7X7_1000", cv::aruco::DICT_7X7_1000},
-    {"ORIGINAL", cv::aruco::DICT_ARUCO_ORIGINAL},
-}};
 
 Error bad_board(std::string_view text, std::string what) {
   return {ErrorKind::bad_input, std::move(what), "--board " + std::string(text), kBoardFormats};
@@ -56,17 +39,6 @@ std::vector<std::string_view> split_at(std::string_view text, char separator) {
   return parts;
 }
 
-std::optional<Meters> parse_length(std::string_view text) {
-  double value = 0;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-  if (error != std::errc{}) return std::nullopt;
-  const std::string_view unit(end, static_cast<std::size_t>(text.data() + text.size() - end));
-  const double scale = unit == "mm" ? 1e-3 : unit == "cm" ? 1e-2 : unit == "m" ? 1 : 0;
-  const double metres = value * scale;
-  if (!(metres >= 1e-5 && metres <= 100)) return std::nullopt;
-  return Meters(metres);
-}
-
 std::optional<std::pair<int, int>> parse_counts(std::string_view text) {
   const auto parts = split_at(text, 'x');
   if (parts.size() != 2) return std::nullopt;
@@ -80,34 +52,9 @@ std::optional<std::pair<int, int>> parse_counts(std::string_view text) {
 }
 
 cv::Ptr<cv::aruco::CharucoBoard> aruco_board(const Board& board) {
-  const auto* known = std::find_if(kDictionaries.begin(), kDictionaries.end(),
-                                   [&](const auto& entry) { return board.dictionary == entry.first; });
   return cv::aruco::CharucoBoard::create(
       board.columns + 1, board.rows + 1, static_cast<float>(board.square.value()),
-      static_cast<float>(board.marker.value()), cv::aruco::getPredefinedDictionary(known->second));
-}
-
-/// The picture as 8-bit grey, with its white at 255.
-cv::Mat grey_of(const ImageView& picture) {
-  const auto& layout = picture.layout;
-  const bool wide = bytes_per_sample(layout.format) == 2;
-  const int depth = wide ? CV_16U : CV_8U;
-  // OpenCV doesn't write to it.
-  const cv::Mat raw(picture.height(), picture.width(), CV_MAKETYPE(depth, channels(layout.format)),
-                    const_cast<std::byte*>(picture.data),
-                    picture.stride);  // NOLINT(cppcoreguidelines-pro-type-const-cast)
-  cv::Mat grey;
-  if (is_bayer(layout.format)) {
-    cv::cvtColor(raw, grey,
-                 cv::COLOR_BayerBG2GRAY);  // RGGB; OpenCV's names start at the second pixel of the second row
-  } else if (channels(layout.format) == 3) {
-    cv::cvtColor(raw, grey, cv::COLOR_RGB2GRAY);
-  } else {
-    grey = raw;
-  }
-  cv::Mat result;
-  grey.convertTo(result, CV_8U, 255.0 / layout.white());
-  return result;
+      static_cast<float>(board.marker.value()), marker_dictionary(board.dictionary));
 }
 
 /// Orders the corners by rows from the left as seen, beginning at the end whose inner square is black.
@@ -211,6 +158,17 @@ bool spans_a_plane(const std::vector<BoardCorner>& corners, const Board& board) 
 
 }  // namespace
 
+std::optional<Meters> parse_length(std::string_view text) {
+  double value = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  if (error != std::errc{}) return std::nullopt;
+  const std::string_view unit(end, static_cast<std::size_t>(text.data() + text.size() - end));
+  const double scale = unit == "mm" ? 1e-3 : unit == "cm" ? 1e-2 : unit == "m" ? 1 : 0;
+  const double metres = value * scale;
+  if (!(metres >= 1e-5 && metres <= 100)) return std::nullopt;
+  return Meters(metres);
+}
+
 Result<Board> parse_board(std::string_view text) {
   const auto parts = split_at(text, ':');
   Board board;
@@ -235,18 +193,14 @@ Result<Board> parse_board(std::string_view text) {
   if (!marker || *marker >= board.square)
     return bad_board(text, "\"" + std::string(parts[3]) + "\" is no marker's edge below that of a square");
   board.marker = *marker;
-  std::string_view dictionary = parts[4];
-  if (dictionary.starts_with("DICT_")) dictionary.remove_prefix(5);
-  board.dictionary = dictionary;
-  const auto* known = std::find_if(kDictionaries.begin(), kDictionaries.end(),
-                                   [&](const auto& entry) { return dictionary == entry.first; });
-  if (known == kDictionaries.end()) {
+  const auto dictionary = marker_dictionary_name(parts[4]);
+  if (!dictionary) {
     std::string names;
-    for (const auto& entry : kDictionaries) names += std::string(names.empty() ? "" : ", ") + entry.first;
-    return bad_board(text, "no dictionary is called \"" + board.dictionary + "\"; there are " + names);
+    for (const std::string& name : marker_dictionaries()) names += (names.empty() ? "" : ", ") + name;
+    return bad_board(text, "no dictionary is called \"" + std::string(parts[4]) + "\"; there are " + names);
   }
-  const int markers = (board.columns + 1) * (board.rows + 1) / 2;
-  if (cv::aruco::getPredefinedDictionary(known->second)->bytesList.rows < markers)
+  board.dictionary = *dictionary;
+  if (markers_in(board.dictionary) < (board.columns + 1) * (board.rows + 1) / 2)
     return bad_board(text, "the dictionary has fewer markers than the board");
   return board;
 }

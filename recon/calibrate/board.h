@@ -46,6 +46,8 @@ struct Board {
 /// "charuco:11x8:30mm:22mm:5X5_100": 11 x 8 SQUARES (as in cv::aruco::CharucoBoard), squares, markers,
 /// dictionary. Lengths in mm, cm or m. The error's remedy is the format.
 Result<Board> parse_board(std::string_view text);
+/// "25mm", "2.5cm" or "0.025m": 1e-5 to 100 m; nothing for any other text.
+std::optional<Meters> parse_length(std::string_view text);
 /// The text that parse_board() reads; "lamp" for a lamp.
 std::string board_words(const Board& board);
 /// "board" or "lamp".

@@ -20,4 +20,13 @@ struct ExrChannel {
 /// OutputFolder. Errors: bad_input for a channel of another size, io.
 Status write_exr(ImageSize size, const std::vector<ExrChannel>& channels, const std::filesystem::path& path);
 
+/// A channel that was read, a value a pixel.
+struct ExrValues {
+  ImageSize size;
+  std::vector<float> values;
+};
+/// Reads the first of these channels that an OpenEXR file has. Errors (bad_input): no such file, none of
+/// them, damaged, sides beyond 16384.
+Result<ExrValues> read_exr(const std::filesystem::path& path, const std::vector<std::string>& names);
+
 }  // namespace emberlock::recon

@@ -74,4 +74,17 @@ std::vector<float> TemperatureLookUp::read(const std::vector<float>& emission, M
   return out;
 }
 
+std::vector<float> TemperatureLookUp::read_green(const std::vector<float>& emission, float hottest) const {
+  std::vector<float> out(emission.size() / 3);
+  if (entries_.empty()) return out;
+  const double front = entries_.front().key;
+  for (std::size_t p = 0; p < out.size(); ++p) {
+    const float green = emission[3 * p + 1];
+    if (!(green > 0)) continue;
+    const double key = front + std::log(static_cast<double>(hottest)) - std::log(static_cast<double>(green));
+    out[p] = static_cast<float>(kelvin(std::max(front, key)));
+  }
+  return out;
+}
+
 }  // namespace emberlock::recon

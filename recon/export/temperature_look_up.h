@@ -22,6 +22,10 @@ class TemperatureLookUp {
   /// K of each place; 0: darker than kShareThatCounts of the brightest, or beyond the table. `emission`: R,
   /// G, B of each, levels a metre. `edge`: of the grid's voxels, which the paper's opacity counts by.
   [[nodiscard]] std::vector<float> read(const std::vector<float>& emission, Meters edge) const;
+  /// The paper's convention on a scale that stays the same while the light changes: a green of `hottest` (>
+  /// 0) and above is its hottest. 0: without green, or below its coldest. For Emitter::paper, whose response
+  /// is taken as relative.
+  [[nodiscard]] std::vector<float> read_green(const std::vector<float>& emission, float hottest) const;
 
  private:
   struct Entry {

@@ -129,7 +129,8 @@ struct FurtherGrids {
     }
     if (!outcome.temperature) return;
     grids.push_back({"temperature", "K", outcome.temperature->kelvin});
-    grids.push_back({"temperature_sigma", "K", outcome.temperature->sigma});
+    if (!outcome.temperature->sigma.empty())
+      grids.push_back({"temperature_sigma", "K", outcome.temperature->sigma});
     for (const LineSummary& line : outcome.temperature->summary.lines)
       line_names.push_back("line_" + line.name);
     for (std::size_t i = 0; i < line_names.size(); ++i)
@@ -219,19 +220,24 @@ Status check_output(const fs::path& folder, const std::vector<fs::path>& inputs)
 Status write_outcome(const Outcome& outcome, const fs::path& folder, const std::vector<fs::path>& inputs,
                      std::string_view page) {
   EMBERLOCK_ASSIGN_OR_RETURN(OutputFolder staging, OutputFolder::create({folder, kReconstruct, inputs}));
+  EMBERLOCK_RETURN_IF_ERROR(write_outcome_files(outcome, staging.path(), page));
+  return staging.commit();
+}
+
+Status write_outcome_files(const Outcome& outcome, const fs::path& folder, std::string_view page) {
   const FurtherGrids further(outcome);
   const Effects& effects = outcome.reconstruction.effects;
-  EMBERLOCK_RETURN_IF_ERROR(write_volume(outcome.reconstruction.volume, staging.path() / "volume.vdb",
-                                         further.grids, {effects.scattering, effects.light}));
+  EMBERLOCK_RETURN_IF_ERROR(write_volume(outcome.reconstruction.volume, folder / "volume.vdb", further.grids,
+                                         {effects.scattering, effects.light}));
   std::error_code ec;
-  fs::create_directory(staging.path() / "views", ec);
+  fs::create_directory(folder / "views", ec);
   for (std::size_t i = 0; i < outcome.renders.size(); ++i) {
     const std::string name = fmt::format("{:04}.png", i);
-    EMBERLOCK_RETURN_IF_ERROR(write_png(to_rgb8(outcome.renders[i]).view(), staging.path() / "views" / name));
+    EMBERLOCK_RETURN_IF_ERROR(write_png(to_rgb8(outcome.renders[i]).view(), folder / "views" / name));
   }
-  EMBERLOCK_RETURN_IF_ERROR(write_file_atomically(staging.path() / "report.json", to_json(outcome.report)));
-  if (!page.empty()) EMBERLOCK_RETURN_IF_ERROR(write_file_atomically(staging.path() / "report.html", page));
-  return staging.commit();
+  EMBERLOCK_RETURN_IF_ERROR(write_file_atomically(folder / "report.json", to_json(outcome.report)));
+  if (!page.empty()) EMBERLOCK_RETURN_IF_ERROR(write_file_atomically(folder / "report.html", page));
+  return {};
 }
 
 }  // namespace emberlock::recon

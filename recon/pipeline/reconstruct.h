@@ -103,10 +103,13 @@ Status check_output(const std::filesystem::path& folder,
 
 /// Writes volume.vdb (with grids `emission_sigma` and `density_sigma` where there are errors,
 /// `emission_noise` and `density_noise` where it is known what of them noise makes, `temperature` and
-/// `temperature_sigma` in K, active where told, and for each line emitter that was looked for
-/// `line_NAME`, its share of the light), views/NNNN.png (8 bits, numbered as in the input) and report.json as
-/// an OutputFolder; and `page` as report.html, unless it is empty.
+/// `temperature_sigma`, if it is known, in K, active where told, and for each line emitter that was looked
+/// for `line_NAME`, its share of the light), views/NNNN.png (8 bits, numbered as in the input) and
+/// report.json as an OutputFolder; and `page` as report.html, unless it is empty.
 Status write_outcome(const Outcome& outcome, const std::filesystem::path& folder,
                      const std::vector<std::filesystem::path>& inputs = {}, std::string_view page = {});
+/// The same files in a folder that is there, such as an OutputFolder's.
+Status write_outcome_files(const Outcome& outcome, const std::filesystem::path& folder,
+                           std::string_view page = {});
 
 }  // namespace emberlock::recon

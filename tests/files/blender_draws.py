@@ -9,48 +9,12 @@ import os
 import sys
 
 import bpy
-import mathutils
 import numpy as np
 
+sys.path.append(os.path.dirname(os.path.abspath(__file__)))
+import blender_shared as shared  # noqa: E402
+
 ask = json.loads(sys.argv[sys.argv.index("--") + 1])
-WHITE = 255  # grey levels
-
-
-def load_volume(path):
-    """Blender renders a missing or unreadable file as black."""
-    if not os.path.isabs(path) or not os.path.isfile(path):
-        raise SystemExit(f"no file with an absolute path: {path}")
-    data = bpy.data.volumes.new("flame")
-    data.filepath = path
-    if not data.grids.load() or data.grids.error_message:
-        raise RuntimeError(f"Blender can't read {path}: {data.grids.error_message}")
-    names = {grid.name for grid in data.grids}
-    missing = set(ask["grids"]) - names
-    if missing:
-        raise RuntimeError(f"{path} has no grids {missing}, only {names}")
-    data.render.precision = "FULL"  # else half floats
-    data.render.clipping = 0
-    flame = bpy.data.objects.new("flame", data)
-    bpy.context.collection.objects.link(flame)
-    return data
-
-
-def emission_material(nodes, links, output):
-    """Emission / 255 and black absorption: emitted light as `emberlock render` sees it."""
-    colour = nodes.new("ShaderNodeAttribute")
-    colour.attribute_name = "emission"
-    light = nodes.new("ShaderNodeEmission")
-    light.inputs["Strength"].default_value = 1 / WHITE
-    links.new(colour.outputs["Color"], light.inputs["Color"])
-    density = nodes.new("ShaderNodeAttribute")
-    density.attribute_name = "density"
-    absorption = nodes.new("ShaderNodeVolumeAbsorption")
-    absorption.inputs["Color"].default_value = (0, 0, 0, 1)
-    links.new(density.outputs["Fac"], absorption.inputs["Density"])
-    both = nodes.new("ShaderNodeAddShader")
-    links.new(light.outputs[0], both.inputs[0])
-    links.new(absorption.outputs[0], both.inputs[1])
-    links.new(both.outputs[0], output.inputs["Volume"])
 
 
 def principled_material(nodes, links, output):
@@ -64,63 +28,8 @@ def principled_material(nodes, links, output):
     links.new(principled.outputs[0], output.inputs["Volume"])
 
 
-def give_material(data):
-    material = bpy.data.materials.new("flame")
-    material.use_nodes = True
-    nodes = material.node_tree.nodes
-    nodes.clear()
-    output = nodes.new("ShaderNodeOutputMaterial")
-    make = {"emission": emission_material, "principled": principled_material}[ask["material"]]
-    make(nodes, material.node_tree.links, output)
-    data.materials.append(material)
-
-
-def place_camera(scene, width, height):
-    """`emberlock render --camera FROM --look-at AT`: 40 degrees across the shorter side, +z up."""
-    eye, at = (mathutils.Vector(ask[key]) for key in ("from", "at"))
-    camera = bpy.data.cameras.new("camera")
-    camera.sensor_fit = "HORIZONTAL" if width <= height else "VERTICAL"
-    camera.angle = np.radians(40)
-    camera.clip_start = 1e-4
-    scene.camera = bpy.data.objects.new("camera", camera)
-    scene.camera.location = eye
-    scene.camera.rotation_euler = (at - eye).to_track_quat("-Z", "Y").to_euler()
-    bpy.context.collection.objects.link(scene.camera)
-    scene.render.resolution_x, scene.render.resolution_y = width, height
-
-
-def set_up_render(scene):
-    scene.render.engine = "CYCLES"
-    scene.cycles.device = "CPU"
-    scene.cycles.samples = ask["samples"]
-    scene.cycles.use_adaptive_sampling = False
-    scene.cycles.use_denoising = False
-    scene.cycles.pixel_filter_type = "BOX"  # rays through the pixels' middles
-    scene.cycles.filter_width = 0.01
-    scene.cycles.volume_step_rate = ask["step_rate"]
-    scene.cycles.volume_max_steps = 65536
-    scene.view_settings.exposure = ask.get("stops", 0)
-    world = bpy.data.worlds.new("nothing")
-    world.use_nodes = True
-    world.node_tree.nodes["Background"].inputs["Color"].default_value = (0, 0, 0, 1)
-    scene.world = world
-    exr = ask["picture"].endswith(".exr")
-    scene.view_settings.view_transform = "Raw" if exr else "Standard"
-    scene.render.image_settings.file_format = "OPEN_EXR" if exr else "PNG"
-    if exr:
-        scene.render.image_settings.color_depth = "32"
-    scene.render.filepath = ask["picture"]
-
-
-def pixels(path):
-    """Height x width x RGB, as the file has them."""
-    image = bpy.data.images.load(path)
-    image.colorspace_settings.name = "Raw" if path.endswith(".exr") else image.colorspace_settings.name
-    return np.array(image.pixels[:], dtype=np.float64).reshape(image.size[1], image.size[0], -1)[..., :3]
-
-
 def compare(seen, expected):
-    both = (pixels(expected), seen)
+    both = (shared.pixels(expected), seen)
     if both[0].shape != both[1].shape or both[0].max() <= 0:
         raise RuntimeError("the pictures are of other sizes, or there is nothing in the expected one")
     scale = both[0].max() - both[0].min()
@@ -135,12 +44,15 @@ def compare(seen, expected):
 
 for thing in list(bpy.data.objects):
     bpy.data.objects.remove(thing)
-give_material(load_volume(ask["volume"]))
+make = {"emission": shared.emission_material, "principled": principled_material}[ask["material"]]
+shared.give_material(shared.load_volume(ask["volume"], ask["grids"]).data, make)
 scene = bpy.context.scene
-place_camera(scene, *ask["image"])
-set_up_render(scene)
+shared.place_camera(scene, ask["from"], ask["at"], *ask["image"])
+shared.set_up_render(scene, ask["picture"], ask["samples"], ask["step_rate"])
+scene.cycles.filter_width = 0.01  # rays through the pixels' middles
+scene.view_settings.exposure = ask.get("stops", 0)
 bpy.ops.render.render(write_still=True)
-seen = pixels(ask["picture"])
+seen = shared.pixels(ask["picture"])
 print(f"SEEN mean {seen.mean():.4f} most {seen.max():.4f}")
 if seen.max() <= 0.05:
     raise RuntimeError("nothing is to be seen")

@@ -1,58 +1,34 @@
 # SPDX-License-Identifier: Apache-2.0
-# Draws the scene of `bench_scene` with Blender's Cycles, by direct light alone, and says how far `emberlock scene` is from it:
+# Draws the scene of `bench_scene` with Blender's Cycles, by direct light alone, and says how far `emberlock scene` is from it; fails where
+# that is more than `most` (0.01) of the range, RMS, or where `wrong`, a picture of another scene, isn't:
 #   blender -b --factory-startup --python-exit-code 1 -P blender_draws_scene.py -- \
 #     '{"scene": "/ABS/scene.json", "volumes": ["/ABS/flame.vdb", ...], "picture": "/ABS/out.exr", "image": [320, 180], "samples": 256,
-#       "expected": "/ABS/frame-0000.exr"}'
+#       "expected": "/ABS/frame-0000.exr", "most": 0.01, "wrong": "/ABS/other.exr"}'
 # `volumes`: the scene's flames in their order, by `emberlock export --format blender4`.
 import json
 import os
 import sys
 
 import bpy
-import mathutils
 import numpy as np
 
+sys.path.append(os.path.dirname(os.path.abspath(__file__)))
+import blender_shared as shared  # noqa: E402
+
 ask = json.loads(sys.argv[sys.argv.index("--") + 1])
-WHITE = 255  # grey levels
 np.bool = bool  # Debian 12 has a glTF importer older than its numpy
 with open(ask["scene"]) as file:
     described = json.load(file)
 
 
 def add_flame(path, flame):
-    """Emission / 255 and black absorption."""
-    data = bpy.data.volumes.new("flame")
-    data.filepath = path
-    if not data.grids.load() or data.grids.error_message:
-        raise RuntimeError(f"Blender can't read {path}: {data.grids.error_message}")
-    data.render.precision = "FULL"
-    data.render.clipping = 0
-    data.render.space = "OBJECT"  # both are divided by the object's scale, as a scene file says
-    thing = bpy.data.objects.new("flame", data)
+    thing = shared.load_volume(path, ["emission", "density"])
+    thing.data.render.space = "OBJECT"  # both are divided by the object's scale, as a scene file says
     thing.location = flame["position"]
     thing.rotation_mode = "XYZ"
     thing.rotation_euler = np.radians(flame["rotation"])
     thing.scale = (flame.get("scale", 1),) * 3
-    bpy.context.collection.objects.link(thing)
-    material = bpy.data.materials.new("flame")
-    material.use_nodes = True
-    nodes, links = material.node_tree.nodes, material.node_tree.links
-    nodes.clear()
-    colour = nodes.new("ShaderNodeAttribute")
-    colour.attribute_name = "emission"
-    light = nodes.new("ShaderNodeEmission")
-    light.inputs["Strength"].default_value = 1 / WHITE
-    links.new(colour.outputs["Color"], light.inputs["Color"])
-    density = nodes.new("ShaderNodeAttribute")
-    density.attribute_name = "density"
-    absorption = nodes.new("ShaderNodeVolumeAbsorption")
-    absorption.inputs["Color"].default_value = (0, 0, 0, 1)
-    links.new(density.outputs["Fac"], absorption.inputs["Density"])
-    both = nodes.new("ShaderNodeAddShader")
-    links.new(light.outputs[0], both.inputs[0])
-    links.new(absorption.outputs[0], both.inputs[1])
-    links.new(both.outputs[0], nodes.new("ShaderNodeOutputMaterial").inputs["Volume"])
-    data.materials.append(material)
+    shared.give_material(thing.data, shared.emission_material)
 
 
 def add_geometry(path):
@@ -72,51 +48,17 @@ def add_geometry(path):
         links.new(diffuse.outputs[0], nodes.new("ShaderNodeOutputMaterial").inputs["Surface"])
 
 
-def place_camera(scene, width, height):
-    eye, at = (mathutils.Vector(described["camera"][key]) for key in ("from", "look_at"))
-    camera = bpy.data.cameras.new("camera")
-    camera.sensor_fit = "HORIZONTAL" if width <= height else "VERTICAL"
-    camera.angle = np.radians(40)
-    camera.clip_start = 1e-4
-    scene.camera = bpy.data.objects.new("camera", camera)
-    scene.camera.location = eye
-    scene.camera.rotation_euler = (at - eye).to_track_quat("-Z", "Y").to_euler()
-    bpy.context.collection.objects.link(scene.camera)
-    scene.render.resolution_x, scene.render.resolution_y = width, height
-
-
 def set_up_render(scene):
-    scene.render.engine = "CYCLES"
+    shared.set_up_render(scene, ask["picture"], ask["samples"], ask.get("step_rate", 1))
     cycles = scene.cycles
-    cycles.device = "CPU"
-    cycles.samples = ask["samples"]
-    cycles.use_adaptive_sampling = False
-    cycles.use_denoising = False
-    cycles.pixel_filter_type = "BOX"
     cycles.filter_width = 1
     # Cycles goes one step farther than it is told: from a surface to a flame, but to no other surface.
     cycles.max_bounces = cycles.diffuse_bounces = cycles.glossy_bounces = 0
     cycles.transmission_bounces = cycles.volume_bounces = 0
     cycles.transparent_max_bounces = 64
     cycles.sample_clamp_indirect = cycles.sample_clamp_direct = 0
-    cycles.volume_step_rate = ask.get("step_rate", 1)
-    cycles.volume_max_steps = 65536
     scene.render.threads_mode = "FIXED"
     scene.render.threads = ask.get("threads", 2)
-    world = bpy.data.worlds.new("nothing")
-    world.use_nodes = True
-    world.node_tree.nodes["Background"].inputs["Color"].default_value = (0, 0, 0, 1)
-    scene.world = world
-    scene.view_settings.view_transform = "Raw"
-    scene.render.image_settings.file_format = "OPEN_EXR"
-    scene.render.image_settings.color_depth = "32"
-    scene.render.filepath = ask["picture"]
-
-
-def pixels(path):
-    image = bpy.data.images.load(path)
-    image.colorspace_settings.name = "Raw"
-    return np.array(image.pixels[:], dtype=np.float64).reshape(image.size[1], image.size[0], -1)[..., :3]
 
 
 def tell(name, off, scale):
@@ -131,14 +73,23 @@ for volume, flame in zip(ask["volumes"], described["flames"]):
 for geometry in described.get("geometry", []):
     add_geometry(os.path.join(os.path.dirname(ask["scene"]), geometry["file"]))
 scene = bpy.context.scene
-place_camera(scene, *ask["image"])
+shared.place_camera(scene, described["camera"]["from"], described["camera"]["look_at"], *ask["image"])
 set_up_render(scene)
 bpy.ops.render.render(write_still=True)
-seen, expected = pixels(ask["picture"]), pixels(ask["expected"])
+seen, expected = shared.pixels(ask["picture"]), shared.pixels(ask["expected"])
 off = expected - seen
-tell("all pixels, of the range", off, seen.max() - seen.min())
+full = seen.max() - seen.min()
+tell("all pixels, of the range", off, full)
 if "flames" in ask:  # the flames alone, without surfaces: where they aren't, surfaces are seen
-    bare = pixels(ask["flames"]).max(axis=2) <= 0
+    bare = shared.pixels(ask["flames"]).max(axis=2) <= 0
     tell("surfaces alone, of their range", off[bare], seen[bare].max() - seen[bare].min())
     tell("flames, of their range", off[~bare], seen[~bare].max() - seen[~bare].min())
     print(f"LIGHT on surfaces {100 * (expected[bare].sum() / seen[bare].sum() - 1):+.3f} %")
+most = ask.get("most", 0.01)
+if np.sqrt(np.mean(off**2)) > most * full:
+    raise RuntimeError(f"emberlock scene differs by more than {100 * most} % of the range")
+if "wrong" in ask:
+    other = shared.pixels(ask["wrong"]) - seen
+    tell("another scene", other, full)
+    if np.sqrt(np.mean(other**2)) <= most * full:
+        raise RuntimeError("another scene would have passed")

@@ -31,6 +31,8 @@ struct GltfText {
   std::string roots = "[0]";
   std::string further = R"("materials": [{}])";
   std::string primitive = R"("material": 0)";
+  std::string attributes = R"("POSITION": 0)";
+  std::string accessors = {};   ///< further ones, from number 2 on, each after a comma
   std::size_t told_points = 0;  ///< how many POSITION says; 0: as many as there are
   std::string uri = {};         ///< of the buffer; empty: within the file
 
@@ -41,11 +43,12 @@ struct GltfText {
     const auto number = [](std::size_t n) { return std::to_string(n); };
     const std::size_t points = told_points > 0 ? told_points : corners.size() / 3;
     return R"({"asset": {"version": "2.0"}, "scene": 0, "scenes": [{"nodes": )" + roots + R"(}], "nodes": )" +
-           nodes + R"(, "meshes": [{"primitives": [{"attributes": {"POSITION": 0}, "indices": 1, )" +
+           nodes + R"(, "meshes": [{"primitives": [{"attributes": {)" + attributes + R"(}, "indices": 1, )" +
            primitive +
            R"(}]}], "accessors": [{"bufferView": 0, "componentType": 5126, "type": "VEC3", "count": )" +
            number(points) + R"(}, {"bufferView": 1, "componentType": 5123, "type": "SCALAR", "count": )" +
-           number(indices.size()) + R"(}], "bufferViews": [{"buffer": 0, "byteOffset": 0, "byteLength": )" +
+           number(indices.size()) + "}" + accessors +
+           R"(], "bufferViews": [{"buffer": 0, "byteOffset": 0, "byteLength": )" +
            number(corners.size() * 4) + R"(}, {"buffer": 0, "byteOffset": )" + number(corners.size() * 4) +
            R"(, "byteLength": )" + number(indices.size() * 2) + R"(}], "buffers": [{"byteLength": )" +
            number(bytes.size()) + R"(, "uri": ")" +

@@ -18,9 +18,9 @@ function glow(value: number): number[] {
 }
 
 const kPalettes = {
-  glow: Array.from({length: 256}, (_, value) => glow(value)),
-  grey: Array.from({length: 256}, (_, value) => [value, value, value]),
-  heat: Array.from({length: 256}, (_, value) => heat(value)),
+  glow: Array.from({length: 256}, (_, value) => [...glow(value), value]),
+  grey: Array.from({length: 256}, (_, value) => [value, value, value, value]),
+  heat: Array.from({length: 256}, (_, value) => [...heat(value), 255]),
 };
 // Optical depth along the longest edge. What is measured shows the colours of what lies in front rather than all light along a ray.
 const kClear = 24;
@@ -30,13 +30,16 @@ export class VolumeView {
   private readonly canvas = el('canvas');
   private readonly stage = new Stage(this.canvas, new Orbit([0, 0, 0], [0, 0, 1], 1));
   private size = '';
+  private shown?: Parameters<VolumeView['show']>;
 
   constructor(container: HTMLElement) {
     container.append(this.canvas);
+    this.stage.renewed = () => { if (this.shown) this.show(...this.shown); };
   }
 
   /** Its brightness, grey or as a flame glows, through red and orange to nearly white; or what is `measured`, as opaque as it is bright. */
   show(header: Volume, bytes: Uint8Array, grey: boolean, measured?: Uint8Array): void {
+    this.shown = [header, bytes, grey, measured];
     const {nx, ny, nz} = header;
     const many = nx * ny * nz;
     if (bytes.length !== many * (1 + (header.layers ?? []).length)) throw new Error(`a volume of ${nx} x ${ny} x ${nz} voxels with ${bytes.length} bytes`);
@@ -49,7 +52,7 @@ export class VolumeView {
     march.setPalette(measured ? kPalettes.heat : grey ? kPalettes.grey : kPalettes.glow);
     if (measured) march.setQuantity(grid, Float32Array.from(measured), voxel => brightness[voxel]! / 255);
     else march.setQuantity(grid, Float32Array.from(brightness));
-    this.stage.look = {mode: 'quantity', low: 0, high: 255, depth: measured ? kDense : kClear, darkest: 0, even: measured !== undefined, levels: []};
+    this.stage.look = {mode: 'quantity', low: 0, high: 255, depth: measured ? kDense : kClear, levels: []};
     // The operator's view stays from iteration to iteration, and from frame to frame.
     const key = JSON.stringify([size, center]);
     if (key !== this.size) {

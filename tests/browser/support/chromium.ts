@@ -4,13 +4,13 @@ import {mkdirSync, writeFileSync} from 'node:fs';
 
 import {type Browser, chromium, type Page} from 'playwright-core';
 
-export async function startChromium(): Promise<Browser> {
+export async function startChromium(more: readonly string[] = []): Promise<Browser> {
   return chromium.launch({
     executablePath: process.env.EMBERLOCK_CHROMIUM ?? '/usr/bin/chromium',
     args: ['--headless', '--no-sandbox', '--disable-quic', '--no-first-run', '--disable-background-networking',
            '--disable-component-update', '--disable-sync',
            // Without a GPU: WebGL by SwiftShader, for the volume alone; composing the page so would take most of a processor.
-           '--disable-gpu-compositing', '--use-angle=swiftshader', '--enable-unsafe-swiftshader'],
+           '--disable-gpu-compositing', '--use-angle=swiftshader', '--enable-unsafe-swiftshader', ...more],
   });
 }
 

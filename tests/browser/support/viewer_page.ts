@@ -6,7 +6,7 @@ import {deflateSync} from 'node:zlib';
 
 import type {Browser, Page} from 'playwright-core';
 
-import {type Channel, type Contents, type Frame, kBrick, type Triple} from '../../../daemon/console/src/viewer/contents';
+import {type Channel, type Contents, type Frame, kBrick, type Triple, type View} from '../../../daemon/console/src/viewer/contents';
 
 export const kViewer = process.env.EMBERLOCK_CONSOLE ?? fileURLToPath(new URL('../../../build/release/console', import.meta.url));
 export const kPrograms = process.env.EMBERLOCK_BIN ?? fileURLToPath(new URL('../../../build/release/bin', import.meta.url));
@@ -36,14 +36,15 @@ export function packed([nx, ny, nz]: Triple, lanes: 1 | 3, values: Float32Array)
 export interface Made {
   points: Triple;
   frame?: number;
+  views?: View[];
   channels: {name: string; unit: string; lanes: 1 | 3; values: Float32Array}[];
 }
 
 /** Key points 1 cm apart, around the origin. */
 export function htmlOf(volumes: readonly Made[], more: Partial<Contents> = {}): string {
   const blocks: string[] = [];
-  const frames: Frame[] = volumes.map(({points, frame, channels}) => ({
-    frame: frame ?? null, points, edge: 0.01, origin: points.map(n => -0.01 * (n - 1) / 2) as unknown as Triple,
+  const frames: Frame[] = volumes.map(({points, frame, views, channels}) => ({
+    frame: frame ?? null, views: views ?? [], points, edge: 0.01, origin: points.map(n => -0.01 * (n - 1) / 2) as unknown as Triple,
     channels: channels.map(({name, unit, lanes, values}): Channel => {
       blocks.push(deflateSync(packed(points, lanes, values)).toString('base64'));
       return {name, unit, lanes, type: 'float32', scale: 1, block: blocks.length - 1};
@@ -58,20 +59,20 @@ ${blocks.map(block => `<script type="application/octet-stream" class="emberlock-
 }
 
 /** Opens a page from the disk and waits for its first picture; what the browser complains of, and what is asked of any server, is kept. */
-export async function openFile(browser: Browser, path: string, size = {width: 1280, height: 900}): Promise<{page: Page; complaints: string[]}> {
+export async function openFile(browser: Browser, path: string, search = '', size = {width: 1280, height: 900}): Promise<{page: Page; complaints: string[]}> {
   const page = await (await browser.newContext({viewport: size, acceptDownloads: true})).newPage();
   const complaints: string[] = [];
   page.on('pageerror', error => complaints.push(`script: ${error.message}`));
   page.on('console', message => { if (message.type() === 'error') complaints.push(message.text()); });
   page.on('request', request => { if (!/^(file|data|blob):/.test(request.url())) complaints.push(`asks elsewhere: ${request.url()}`); });
-  await page.goto(pathToFileURL(path).href);
+  await page.goto(pathToFileURL(path).href + search);
   await page.waitForFunction(() => 'emberlockViewer' in window || document.querySelector('.fault:not([hidden])') !== null, undefined, {timeout: 60_000});
   return {page, complaints};
 }
 
-export async function openMade(browser: Browser, path: string, volumes: readonly Made[], more: Partial<Contents> = {}): Promise<{page: Page; complaints: string[]}> {
+export async function openMade(browser: Browser, path: string, volumes: readonly Made[], more: Partial<Contents> = {}, search = ''): Promise<{page: Page; complaints: string[]}> {
   writeFileSync(path, htmlOf(volumes, more));
-  return openFile(browser, path);
+  return openFile(browser, path, search);
 }
 
 /** A value at every key point, by its place from -1 to 1 on each axis. */

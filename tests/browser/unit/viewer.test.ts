@@ -2,11 +2,12 @@
 import {expect, test} from 'vitest';
 
 import {bricksOf, emptiness, filledPart, kCells} from '../../../daemon/console/src/viewer/bricks';
-import {difference} from '../../../daemon/console/src/viewer/compare';
-import {type Channel, decode, inflated, type Triple} from '../../../daemon/console/src/viewer/contents';
+import {difference, errorOf} from '../../../daemon/console/src/viewer/compare';
+import {type Channel, decode, type FilmingCamera, type Frame, inflated, type Triple} from '../../../daemon/console/src/viewer/contents';
 import {cross, dot, eyeOf, Orbit, placeOf, seen} from '../../../daemon/console/src/viewer/eye';
 import {usualRange} from '../../../daemon/console/src/viewer/quantities';
 import {words} from '../../../daemon/console/src/viewer/slices';
+import {histogram, type Knot, moved, opacityAt} from '../../../daemon/console/src/viewer/transfer';
 import {packed} from '../support/viewer_page';
 
 const points: Triple = [11, 19, 9];
@@ -92,8 +93,7 @@ test('an orbit is upright and looks at its middle, whatever is up', () => {
 });
 
 test('a filming camera’s eye sees what it saw where it saw it', () => {
-  const camera = {name: '', role: 'input', size: [320, 240], focal: [300, 310], middle: [150, 130], rotation: [0, -1, 0, 0, 0, -1, 1, 0, 0], translation: [0.1, 0.2, 1.5],
-                  rmse: null, captured: null, rendered: null} as const;
+  const camera = {name: '', role: 'input', size: [320, 240], focal: [300, 310], middle: [150, 130], rotation: [0, -1, 0, 0, 0, -1, 1, 0, 0], translation: [0.1, 0.2, 1.5]} as const;
   expect(placeOf(camera).map(v => Math.round(1e9 * v) / 1e9)).toEqual([-1.5, 0.1, 0.2]);
   const world: Triple = [0.2, 0.05, -0.1];
   const [x, y, z] = [-world[1] + 0.1, -world[2] + 0.2, world[0] + 1.5];
@@ -111,4 +111,22 @@ test('few stray values don’t set the colours, and words have the digits that m
   expect(usualRange(new Float32Array(4))).toEqual([0, 1]);
   expect([words(1873.4, 'K'), words(12.345, 'K'), words(0.01234, '1/m'), words(0, 'K')]).toEqual(['1873 K', '12.3 K', '0.0123 1/m', '0 K']);
   expect([...difference(Uint8ClampedArray.from([10, 0, 200, 255]), Uint8ClampedArray.from([0, 5, 20, 255]), 4)]).toEqual([40, 20, 255, 255]);
+});
+
+test('a curve of opacity goes straight from knot to knot, which keep their order, and all values in range are counted', () => {
+  const knots: Knot[] = [[0, 0.25], [0.5, 1], [0.5, 0], [1, 0.5]];
+  expect([0, 0.25, 0.5, 0.75, 1].map(x => opacityAt(knots, x))).toEqual([0.25, 0.625, 1, 0.25, 0.5]);
+  expect(moved(knots, 1, [0.9, 2])[1]).toEqual([0.5, 1]);
+  expect(moved(knots, 1, [-1, 0.5])[1]).toEqual([0, 0.5]);
+  expect([moved(knots, 0, [0.3, 0])[0], moved(knots, 3, [0.3, 0])[3]]).toEqual([[0, 0], [1, 0]]);
+  expect(histogram(Float32Array.from([0, 1, 1.4, 2, 3, 3.1, NaN]), 1, 3, 2)).toEqual([2, 2]);
+});
+
+test('a frame’s error is the mean square of its views’ by role, of those that are told', () => {
+  const cameras = ['input', 'held_out', 'input', 'input'].map(role => ({role}) as FilmingCamera);
+  const rmse: (Triple | null)[] = [[3, 0, 0], [1, 2, 2], null, [0, 3, 0]];
+  const frame = {views: rmse.map(one => ({rmse: one, captured: null, rendered: null}))} as Frame;
+  expect(errorOf(frame, cameras, 'input')).toBeCloseTo(Math.sqrt(3), 12);
+  expect(errorOf(frame, cameras, 'held_out')).toBeCloseTo(Math.sqrt(3), 12);
+  expect(errorOf({views: [] as Frame['views']} as Frame, cameras, 'input')).toBeNull();
 });

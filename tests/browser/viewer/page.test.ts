@@ -9,7 +9,7 @@ import {join} from 'node:path';
 import type {Browser, Page} from 'playwright-core';
 import {afterAll, beforeAll, expect, test} from 'vitest';
 
-import type {FilmingCamera} from '../../../daemon/console/src/viewer/contents';
+import type {FilmingCamera, View} from '../../../daemon/console/src/viewer/contents';
 import {screenshot, startChromium, until} from '../support/chromium';
 import {flame, type Made, openMade, sampled} from '../support/viewer_page';
 
@@ -119,9 +119,10 @@ test('it is turned by mouse, wheel and keys, and looks from the cameras', async 
     return uri;
   })();
   const camera = (name: string, role: 'input' | 'held_out', rotation: readonly number[]): FilmingCamera =>
-    ({name, role, size: [320, 240], focal: [300, 300], middle: [160, 120], rotation, translation: [0, 0, 1.6], rmse: [1, 2, 3], captured: red, rendered: red});
+    ({name, role, size: [320, 240], focal: [300, 300], middle: [160, 120], rotation, translation: [0, 0, 1.6]});
+  const seen = (error: number): View => ({rmse: [error, error, error], captured: red, rendered: red});
   const cameras = [camera('from x', 'input', [0, 1, 0, 0, 0, -1, -1, 0, 0]), camera('from y', 'held_out', [-1, 0, 0, 0, 0, -1, 0, -1, 0])];
-  const {page, complaints} = await open([flame(33)], {cameras, trace: [{seconds: 1, input: 4, held_out: 5}, {seconds: 2, input: 3, held_out: 4}]});
+  const {page, complaints} = await open([{...flame(33), views: [seen(1), seen(2)]}, {...flame(17), views: [seen(4), seen(3)]}], {cameras, trace: [{seconds: 1, input: 4, held_out: 5}, {seconds: 2, input: 3, held_out: 4}]});
   const stage = page.locator('canvas.stage');
   const picture = () => stage.evaluate(canvas => (canvas as HTMLCanvasElement).toDataURL());
   let before = await picture();
@@ -147,9 +148,13 @@ test('it is turned by mouse, wheel and keys, and looks from the cameras', async 
   await page.getByRole('button', {name: 'Look from there'}).click();
   await changed('as the camera does');
   await page.waitForSelector('canvas[data-view="1"]');
-  expect(await page.getByText('RMS 1.00 / 2.00 / 3.00').count()).toBe(1);
+  expect(await page.getByText('RMS 2.00 / 2.00 / 2.00').count()).toBe(1);
   await page.getByRole('button', {name: 'See it all'}).click();
   await changed('all');
+  // Each frame has its pictures, and a plot tells which is worse.
+  await page.getByLabel('Frame of the sequence').press('End');
+  await until(() => page.getByText('RMS 3.00 / 3.00 / 3.00').count(), count => count === 1, 'the other frame’s view');
+  expect(await page.getByRole('img', {name: 'Error of each frame'}).isVisible()).toBe(true);
   await screenshot(page, 'viewer-cameras', true);
   await page.addScriptTag({path: axe});
   const told = await page.evaluate(async () => {
@@ -180,14 +185,43 @@ test('temperatures have a bar in K, isotherms are surfaces and lines, and the po
   await until(white, count => count > 40, 'isotherms in the slice');
   // Nothing but surfaces: one at each level, none of them where it is colder.
   await page.getByLabel('Opacity', {exact: true}).fill('0');
-  const surfaces = await until(() => lit(page), count => count > 0, 'isotherms in space');
-  expect(surfaces).toBeLessThan(before);
+  await until(() => lit(page), count => count > 0 && count < before, 'isotherms alone in space');
   await screenshot(page, 'viewer-isotherms', true);
   await page.getByLabel('How many isotherms').fill('0');
   await until(() => lit(page), count => count === 0, 'neither opacity nor isotherms: nothing');
   const box = (await slice.boundingBox())!;
   await slice.hover({position: {x: box.width / 2, y: box.height / 2}});
   await until(() => page.locator('.below').textContent(), text => /^1\d\d\d K$|^20\d\d K$/.test(text ?? ''), 'a temperature');
+  expect(complaints).toEqual([]);
+  await page.context().close();
+});
+
+test('a curve says how opaque each value is, by pointer and by keys', async () => {
+  const {page, complaints} = await open([flame(33)]);
+  await choose(page, 'temperature');
+  const before = await lit(page);
+  expect(before).toBeGreaterThan(1000);
+  const knots = page.locator('.transfer circle');
+  expect(await knots.count()).toBe(2);
+  expect(await page.locator('.transfer .counts').getAttribute('d'), 'the values are counted').toMatch(/V0\.0H/);
+  // Nothing but what is hot: opaque from two thirds on.
+  const box = (await page.locator('.transfer').boundingBox())!;
+  await page.mouse.move(box.x + box.width * 0.66, box.y + box.height * 0.3);
+  await page.mouse.down();
+  await page.mouse.move(box.x + box.width * 0.66, box.y + box.height, {steps: 3});
+  await page.mouse.up();
+  expect(await knots.count()).toBe(3);
+  const hot = await until(() => lit(page), count => count < 0.8 * before, 'what is colder is gone');
+  expect(hot).toBeGreaterThan(100);
+  await screenshot(page, 'viewer-curve');
+  await knots.nth(1).press('ArrowUp');
+  expect(await knots.nth(1).getAttribute('aria-valuetext')).toBe('5 %');
+  await until(() => lit(page), count => count > hot, 'a little of it is back');
+  await knots.nth(1).press('Delete');
+  await knots.nth(0).press('Insert');
+  expect(await knots.count()).toBe(3);
+  await page.getByRole('button', {name: 'Straight'}).click();
+  await until(() => lit(page), count => count === before, 'as in the beginning');
   expect(complaints).toEqual([]);
   await page.context().close();
 });

@@ -22,8 +22,10 @@
 #include "recon/preprocess/radiance.h"
 #include "recon/synthetic/carried_board.h"
 #include "recon/synthetic/flame.h"
+#include "session/video_writer.h"
 #include "tests/support/board_rig.h"
 #include "tests/support/hot_volume.h"
+#include "tests/support/marker_film.h"
 #include "tests/support/recording.h"
 #include "tests/support/scene_files.h"
 #include "tests/support/strobe_clips.h"
@@ -114,6 +116,17 @@ fs::path make_target(const fs::path& folder) {
   return folder;
 }
 
+/// Two frames of a marker.
+fs::path make_marker_film(const fs::path& path) {
+  const recon::Intrinsics lens{{160, 120}, 160, 160, 80, 60, {}};
+  auto film = session::VideoWriter::create(path, {lens.size, PixelFormat::rgb8, 8}, Hertz(30), 0,
+                                           session::VideoWriter::Coding::lossless);
+  const test::Plate plate(test::usual_marker());
+  for (int f = 0; f < 2; ++f) EXPECT_TRUE((*film)->show(plate.seen_by(test::in_a_hand(lens, f / 30.0))).ok());
+  EXPECT_TRUE((*film)->close().ok());
+  return path;
+}
+
 /// Two clips of one strobe and one of a comb, and the words that tell of them.
 Words make_clips(const fs::path& folder) {
   drivers::VirtualRigDraw model;
@@ -145,6 +158,7 @@ class OutputFolders : public testing::Test {
     const std::string session = (temp_ / "session").string();
     const std::string scene = (temp_ / "scene.json").string();
     write(scene, R"({"format": "emberlock scene", "version": 1, "flames": [{"result": "hot/volume.vdb"}]})");
+    const std::string marker_film = make_marker_film(temp_ / "marker.mkv").string();
     Words clips = make_clips(temp_ / "clips");
     const fs::path clip = clips.front();
     clips.insert(clips.begin(), "verify");
@@ -221,6 +235,19 @@ class OutputFolders : public testing::Test {
          {"scene", scene, "--frames", "2", "--image", "32x32"},
          hot,
          {"frame-0000.png", "frame-0001.png"}},
+        {"stylize",
+         "--out",
+         add_stylize,
+         {"stylize", transforms, "--voxels", "8", "--iterations", "2", "--effects", "none", "--device", "cpu",
+          "--passes", "1", "--previews"},
+         temp_ / "project" / "view2.png",
+         {"report.json", "volume.vdb", "views/0003.png", "edits.json", "previews/0001.png"}},
+        {"ar",
+         "--out",
+         add_ar,
+         {"ar", marker_film, hot, "--marker", "aruco:4X4_50:7:80mm", "--focal", "160"},
+         marker_film,
+         {"ar.mp4", "poses.json"}},
         {"export", "--out", add_export, {"export", hot}, hot, {"flame.vdb"}},
         {"measure", "--out", add_measure, {"measure", hot, hot}, hot, {"measures.csv", "measures.html"}},
         {"simulate flame",
@@ -294,18 +321,20 @@ TEST_F(OutputFolders, TheTablesHoldEveryVerbThatWritesOne) {
     }
   }
   CLI::App app{"", "emberlock"};
-  for (const auto add : {add_devices,   add_smear,    add_align,  add_reconstruct, add_verify,   add_tradeoff,
-                         add_calibrate, add_import,   add_demo,   add_sample,      add_doctor,   add_bench,
-                         add_sessions,  add_status,   add_jobs,   add_watch,       add_record,   add_strobe,
-                         add_measure,   add_simulate, add_render, add_export,      add_evaluate, add_scene})
+  for (const auto add :
+       {add_devices, add_smear,    add_align,  add_reconstruct, add_verify,  add_tradeoff, add_calibrate,
+        add_import,  add_demo,     add_sample, add_doctor,      add_bench,   add_sessions, add_status,
+        add_jobs,    add_watch,    add_record, add_strobe,      add_measure, add_simulate, add_render,
+        add_export,  add_evaluate, add_scene,  add_ar,          add_stylize})
     add(app);
   std::set<std::string> found;
   cli::visit(app, "emberlock", [&](const CLI::App& verb, const std::string& path) {
     for (const CLI::Option* option : cli::options_of(verb)) {
       const std::string words = option->get_description();
       const bool folder = words.find("older") != std::string::npos || option->check_lname("out");
-      const bool reads =
-          option->get_positional() || option->check_lname("strobe") || option->check_lname("camera");
+      const bool reads = option->get_positional() || option->check_lname("strobe") ||
+                         option->check_lname("camera") || option->check_lname("mask") ||
+                         option->check_lname("depth") || option->check_lname("rig");
       if (folder && !reads) found.insert(path + " " + option->get_name());
     }
   });

@@ -74,6 +74,54 @@ TEST_F(GltfFileTest, MaterialsHaveTheFactorsOfTheirColours) {
   EXPECT_THAT(scene->notes, ElementsAre(HasSubstr("opaque")));
 }
 
+/// A picture of two pixels, white and black, and places on it that are the numbers of POSITION, two and two.
+TEST_F(GltfFileTest, TexturesAndNormalsAreTaken) {
+  GltfText gltf;
+  gltf.corners = {0, 0.5F, 1, 0.25F, 0.75F, 1, 0, 0, -1};
+  gltf.attributes = R"("POSITION": 0, "NORMAL": 0, "TEXCOORD_1": 2)";
+  gltf.accessors = R"(, {"bufferView": 0, "componentType": 5126, "type": "VEC2", "count": 3})";
+  gltf.nodes = R"([{"mesh": 0, "scale": [1, 2, 1]}])";
+  const std::string picture =
+      test::base64(std::string("P6 2 1 255 ") + "\xff\xff\xff" + std::string(3, '\0'));
+  gltf.further =
+      R"("materials": [{"pbrMetallicRoughness": {"baseColorTexture": {"index": 0, "texCoord": 1}}}],
+      "textures": [{"source": 0, "sampler": 0}], "samplers": [{"wrapS": 33071, "wrapT": 33648}],
+      "images": [{"uri": "data:image/png;base64,)" +
+      picture + R"("}])";
+  const auto scene = read(gltf.text());
+  ASSERT_TRUE(scene.ok()) << scene.error().message();
+  const Material& m = mesh_.materials.at(mesh_.material.at(0));
+  ASSERT_EQ(m.texture, 0);
+  const Texture& texture = mesh_.textures.at(0);
+  EXPECT_EQ(texture.width, 2);
+  EXPECT_EQ(texture.across, Wrap::clamp);
+  EXPECT_EQ(texture.down, Wrap::mirror);
+  EXPECT_THAT(texture.rgb, ElementsAre(255, 255, 255, 0, 0, 0));
+  EXPECT_THAT(mesh_.texture_places,
+              ElementsAre(ElementsAre(0, 0.5F), ElementsAre(1, 0.25F), ElementsAre(0.75F, 1)));
+  // (0, 0.5, 1) on a surface that is stretched upwards leans half as much; z is the world's -y.
+  const float length = std::sqrt(0.25F * 0.25F + 1);
+  EXPECT_THAT(mesh_.normals.at(0),
+              ElementsAre(0, FloatNear(-1 / length, 1e-5F), FloatNear(0.25F / length, 1e-5F)));
+}
+
+TEST_F(GltfFileTest, RefusesTexturesThatItCannotShow) {
+  GltfText gltf;
+  const auto with = [&](const std::string& uri) {
+    gltf.further = R"("materials": [{"pbrMetallicRoughness": {"baseColorTexture": {"index": 0}}}],
+      "textures": [{"source": 0}], "images": [{"uri": ")" +
+                   uri + R"("}])";
+    return gltf.text();
+  };
+  expect_refused(with("nowhere.png"), "nowhere.png");
+  expect_refused(with("data:image/png;base64," + test::base64("no picture")), "images[0]");
+  expect_refused(with("data:image/png;base64," + test::base64("P6 90000 90000 255 ")), "images[0]");
+  gltf.attributes = R"("POSITION": 0, "TEXCOORD_0": 2)";
+  gltf.accessors = R"(, {"bufferView": 0, "componentType": 5126, "type": "VEC2", "count": 2})";
+  expect_refused(with("data:image/png;base64," + test::base64(std::string("P6 1 1 255 ") + "abc")),
+                 "one for each vertex");
+}
+
 TEST_F(GltfFileTest, ASecondFileKeepsItsOwnMaterials) {
   GltfText gltf;
   ASSERT_TRUE(read(gltf.text()).ok());
@@ -178,19 +226,19 @@ TEST_F(GltfFileTest, RefusesWhatItCannotShow) {
   expect_refused(std::string(100000, '['), "");
 }
 
-/// A mesh of twenty thousand triangles, shown by so many nodes that there would be ten million.
+/// A mesh of twenty thousand triangles, shown by so many nodes that there would be more than ten million.
 TEST_F(GltfFileTest, RefusesMoreTrianglesThanItHolds) {
   GltfText gltf;
   gltf.indices.assign(60000, 0);
   gltf.nodes = "[";
   gltf.roots = "[";
-  for (int i = 0; i < 500; ++i) {
+  for (int i = 0; i < 501; ++i) {
     gltf.nodes += std::string(i > 0 ? "," : "") + R"({"mesh": 0})";
     gltf.roots += (i > 0 ? "," : "") + std::to_string(i);
   }
   gltf.nodes += "]";
   gltf.roots += "]";
-  expect_refused(gltf.text(), "more than 5000000 triangles");
+  expect_refused(gltf.text(), "more than 10000000 triangles");
 }
 
 TEST_F(GltfFileTest, PointsAndLinesAreLeftOutAndTold) {

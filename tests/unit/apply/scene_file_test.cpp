@@ -65,11 +65,36 @@ TEST(SceneFile, ReadsCamerasGeometryAndColours) {
   EXPECT_EQ(scene->camera.stops.size(), 2U);
   EXPECT_NEAR(scene->camera.field_of_view.value(), std::numbers::pi / 3, 1e-12);
   EXPECT_EQ(scene->camera.up.z(), -1);
-  EXPECT_EQ(scene->ambient[2], 3);
+  EXPECT_EQ(scene->light.ambient[2], 3);
+  EXPECT_EQ(scene->light.source, recon::Light::Source::none);
   EXPECT_EQ(scene->background[0], 4);
 }
 
+TEST(SceneFile, ReadsItsLightAsMatterScattersIt) {
+  const auto sun =
+      scene_with(R"(, "albedo": 0.5)", R"(, "light": {"towards": [0, 0, 2], "level": [200, 100, 0]})");
+  ASSERT_TRUE(sun.ok()) << sun.error().message();
+  EXPECT_EQ(sun->flames[0].albedo, 0.5);
+  EXPECT_EQ(sun->light.source, recon::Light::Source::distant);
+  EXPECT_EQ(sun->light.strength[0], 50);
+  const auto lamp = scene_with("", R"(, "light": {"at": [1, 0, 3], "level": [4, 4, 4]})");
+  ASSERT_TRUE(lamp.ok()) << lamp.error().message();
+  EXPECT_FALSE(lamp->flames[0].albedo);
+  EXPECT_EQ(lamp->light.source, recon::Light::Source::nearby);
+  EXPECT_EQ(lamp->light.place[2], 3);
+}
+
 TEST(SceneFile, SaysWhichKeyCannotBeUsed) {
+  EXPECT_THAT(error_of(scene_with("", R"(, "light": {"towards": [0, 0, 1]})")),
+              HasSubstr("light.level: is missing"));
+  EXPECT_THAT(error_of(scene_with("", R"(, "light": {"level": [1, 1, 1]})")),
+              HasSubstr("light.towards: is missing"));
+  EXPECT_THAT(error_of(scene_with("", R"(, "light": {"towards": [0, 0, 0], "level": [1, 1, 1]})")),
+              HasSubstr("no direction"));
+  EXPECT_THAT(
+      error_of(scene_with("", R"(, "light": {"towards": [0, 0, 1], "at": [0, 0, 1], "level": [1, 1, 1]})")),
+      HasSubstr("both"));
+  EXPECT_THAT(error_of(scene_with(R"(, "albedo": 2)")), HasSubstr("flames[0].albedo: is out of range"));
   EXPECT_THAT(error_of(scene_with(R"(, "brightnes": 2)")),
               HasSubstr("s.json: flames[0].brightnes: isn't known"));
   EXPECT_THAT(error_of(scene_with(R"(, "scale": 0)")), HasSubstr("flames[0].scale: is out of range"));

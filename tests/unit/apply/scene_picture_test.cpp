@@ -8,7 +8,7 @@
 
 #include <gtest/gtest.h>
 
-#include "apply/surface_light.h"
+#include "apply/light_tables.h"
 #include "recon/render/render.h"
 #include "tests/support/camera_at.h"
 #include "tests/support/small_scene.h"
@@ -107,13 +107,38 @@ TEST_F(ScenePictureTest, AColouredSurfaceReflectsItsShareAndShinesByItself) {
   const Surfaces floor = built(std::move(mesh));
   const Flame none = flame(spark(0));
   PictureOptions options;
-  const ScenePicture seen = scene_picture({&none}, {floor, {8, 8, 8}, {77, 0, 0}},
+  recon::Light even;
+  even.ambient = {8, 8, 8};
+  const ScenePicture seen = scene_picture({&none}, {floor, even, {77, 0, 0}},
                                           camera_at({1, 0, 1}, {0, 0, 0}, kSmall, 40), options, pool_);
   EXPECT_NEAR(seen.light.rgb[0], 1 + 0.5 * 8, 1e-4);
   EXPECT_NEAR(seen.light.rgb[1], 2 + 0.25 * 8, 1e-4);
   EXPECT_NEAR(seen.light.rgb[2], 3, 1e-4);
   EXPECT_EQ(seen.opacity[0], 1);
   EXPECT_EQ(seen.error[0], 0);
+}
+
+/// A small square that shines, above a floor that is seen from beneath it: L = emitted A cos^2 / (pi r^2).
+/// Its upper side shines as well, and a plate between them takes it all.
+TEST_F(ScenePictureTest, ASquareThatGlowsLightsAFloor) {
+  const recon::CameraModel camera = camera_at({0.6, 0.2, 0.4}, {0.1, 0, 0}, kSmall, 40);
+  const Flame none = flame(spark(0));
+  for (const bool hidden : {false, true}) {
+    Mesh mesh = floor_of();
+    test::add_square(mesh, 0.1, -0.1, 0.8, 0.02, {{0, 0, 0}, {8000, 4000, 0}});
+    if (hidden) test::add_square(mesh, 0.1, -0.1, 0.79, 0.5);
+    const ScenePicture seen = picture({&none}, built(std::move(mesh)), camera, 128);
+    for (int y = 0; y < kSmall.height; ++y)
+      for (int x = 0; x < kSmall.width; ++x) {
+        const Eigen::Vector3d at = on_floor(camera, x, y);
+        const double r = (Eigen::Vector3d(0.1, -0.1, 0.8) - at).norm();
+        const double expected =
+            hidden ? 0 : 8000 * 0.04 * 0.04 * 0.8 * 0.8 / (std::numbers::pi * std::pow(r, 4));
+        const std::size_t i = 3 * static_cast<std::size_t>(y * kSmall.width + x);
+        ASSERT_NEAR(static_cast<double>(seen.light.rgb[i]), expected, 0.015 * expected) << x << ' ' << y;
+        ASSERT_NEAR(static_cast<double>(seen.light.rgb[i + 1]), expected / 2, 0.0075 * expected);
+      }
+  }
 }
 
 TEST_F(ScenePictureTest, BehindAPlateTheFloorIsDarkAndTheFlameHidden) {
@@ -289,7 +314,6 @@ TEST_F(ScenePictureTest, SamplesOfTheIrradianceAreRightInTheMean) {
     return std::array<float, 4>{100, 100, 100, kSigma};
   }));
   const std::vector<const Flame*> flames{&cube};
-  const Eigen::Vector3d up = Eigen::Vector3d::UnitZ();
   for (const double x : {0.0, 0.12, 0.4}) {
     const Eigen::Vector3d place(x, 0.03, -0.01);
     constexpr int kBoxes = 60;
@@ -309,13 +333,17 @@ TEST_F(ScenePictureTest, SamplesOfTheIrradianceAreRightInTheMean) {
     Mesh nothing;
     test::add_square(nothing, 50, 50, 0, 0.1);  // elsewhere
     const Surfaces away = built(std::move(nothing));
-    const SurfaceLight unhidden(flames, away);
-    SurfaceLight::Scratch scratch;
-    Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+    const LightTables tables(flames, {});
+    const FallingLight<EmbreeTriangles, 4> unhidden{tables.view(), away.triangles()};
+    double light = 0;
     constexpr int kSamples = 20000;
+    const Eigen::Vector3f at = place.cast<float>();
     for (int s = 0; s < kSamples; ++s)
-      sum += unhidden.sample(place, up, {1, static_cast<std::uint64_t>(1000 * x), s, kSamples}, scratch);
-    EXPECT_NEAR(sum[0] / kSamples, expected, 0.02 * expected) << x;
+      light += static_cast<double>(unhidden
+                                       .of_flames({at[0], at[1], at[2]}, {0, 0, 1},
+                                                  {1, static_cast<std::uint64_t>(1000 * x), s, kSamples})
+                                       .x);
+    EXPECT_NEAR(light / kSamples, expected, 0.02 * expected) << x;
   }
 }
 

@@ -133,6 +133,7 @@ TEST_F(SceneCommandTest, WhatCannotBeDrawnLeavesNothing) {
                                     {"from": [0, 1, 0], "look_at": [0, 0, 0]}]})");
   expect_refused(run("scene.json", {"--frames", "1"}), "two frames");
   expect_refused(run("scene.json", {"--rate", "500"}), "out of range");
+  expect_refused(run("scene.json", {"--device", "abacus"}), "unknown device");
   put_file("floor.gltf", "no glTF");
   expect_refused(run("scene.json"), "floor.gltf");
 }

@@ -206,7 +206,8 @@ TEST(House, OnlyOutputFolderReplacesAndRemovesFolders) {
   // These fill a folder that OutputFolder made.
   EXPECT_EQ(files_with({"cli", "films", "report", "recon"}, std::regex("create_director")),
             (std::set<std::string>{"report/box_pictures.cpp", "films/import_parts.cpp",
-                                   "recon/calibrate/rig_formats.cpp", "recon/pipeline/reconstruct.cpp"}));
+                                   "recon/calibrate/rig_formats.cpp", "recon/pipeline/reconstruct.cpp",
+                                   "cli/stylize_command.cpp"}));
 }
 
 TEST(House, EveryFolderExplainsItself) {

@@ -133,6 +133,16 @@ TEST(ViewerPage, RefusesWhatIsNotFiniteAndWhatDoesNotFit) {
   EXPECT_FALSE(page.add_frame({kGrid, {}, {}}).ok());
 }
 
+TEST(ViewerPage, EachFrameHasItsOwnViews) {
+  ViewerPage page("title", "input", Eigen::Vector3d::UnitZ(), Stored::half);
+  const recon::SharedVolume volume{kGrid, {corner(3, 1)}, {}};
+  ASSERT_TRUE(page.add_frame(volume, {{{{1.5, 2, 3}}, "data:a", ""}}).ok());
+  ASSERT_TRUE(page.add_frame(volume).ok());
+  const std::string html = page.html({});
+  EXPECT_THAT(html, HasSubstr(R"("views":[{"captured":"data:a","rendered":null,"rmse":[1.5,2.0,3.0]}])"));
+  EXPECT_THAT(html, HasSubstr(R"("views":[])"));
+}
+
 TEST(ViewerPage, NamesCannotEndTheScriptsTheyStandIn) {
   ViewerPage page("</title><b>", "</script><b>", Eigen::Vector3d::UnitZ(), Stored::half);
   ASSERT_TRUE(page.add_frame({kGrid, {corner(3, 1)}, {}}).ok());

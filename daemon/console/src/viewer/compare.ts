@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // A view as it was captured, as the volume renders it, and their difference.
 import {el, set, setText, show} from '../dom';
-import {type FilmingCamera, kDifferenceGain} from './contents';
+import {type FilmingCamera, type Frame, kDifferenceGain, type View} from './contents';
 
 async function pixels(address: string): Promise<ImageData> {
   const image = new Image();
@@ -20,6 +20,12 @@ export function difference(a: Uint8ClampedArray, b: Uint8ClampedArray, gain: num
   return out;
 }
 
+/** The root of the mean square of views' errors by role and over R, G and B, grey levels; null where none is told. */
+export function errorOf({views}: Frame, cameras: readonly FilmingCamera[], role: FilmingCamera['role']): number | null {
+  const squares = views.flatMap(({rmse}, n) => rmse && cameras[n]?.role === role ? rmse.map(v => v * v) : []);
+  return squares.length > 0 ? Math.sqrt(squares.reduce((sum, v) => sum + v, 0) / squares.length) : null;
+}
+
 function title(camera: FilmingCamera): string {
   return camera.role === 'held_out' ? `${camera.name}, held out` : camera.name;
 }
@@ -32,6 +38,7 @@ export class Compare {
   private readonly error = el('figcaption');
   private readonly three: HTMLElement;
   private shown = -1;
+  private views: readonly View[] = [];
   readonly root: HTMLElement;
 
   /** `chosen` is told which view is looked at; `follow` wants to see the volume as that camera does. */
@@ -48,28 +55,41 @@ export class Compare {
     show(this.root, order.length > 0);
   }
 
+  /** Of a frame, as each camera saw it. */
+  show(views: readonly View[]): void {
+    if (views === this.views) return;
+    this.views = views;
+    this.draw();
+  }
+
   choose(index: number): void {
-    const camera = this.cameras[index];
-    if (!camera || index === this.shown) return;
+    if (!this.cameras[index] || index === this.shown) return;
     this.shown = index;
     this.select.value = String(index);
-    set(this.captured, 'src', camera.captured ?? undefined);
-    set(this.rendered, 'src', camera.rendered ?? undefined);
-    show(this.captured.parentElement!, camera.captured !== null);
-    show(this.rendered.parentElement!, camera.rendered !== null);
-    const both = camera.captured !== null && camera.rendered !== null;
-    show(this.apart.parentElement!, both);
-    const rmse = camera.rmse ? `, RMS ${camera.rmse.map(v => v.toFixed(2)).join(' / ')} of 255 (R / G / B)` : '';
-    setText(this.error, `difference, ${kDifferenceGain} times as bright${rmse}`);
-    if (both) void this.subtract(index, camera.captured!, camera.rendered!);
+    this.draw();
     this.chosen(index);
   }
 
-  private async subtract(index: number, captured: string, rendered: string): Promise<void> {
+  private draw(): void {
+    const view = this.views[this.shown];
+    show(this.three, view !== undefined);
+    if (!view) return;
+    set(this.captured, 'src', view.captured ?? undefined);
+    set(this.rendered, 'src', view.rendered ?? undefined);
+    show(this.captured.parentElement!, view.captured !== null);
+    show(this.rendered.parentElement!, view.rendered !== null);
+    const both = view.captured !== null && view.rendered !== null;
+    show(this.apart.parentElement!, both);
+    const rmse = view.rmse ? `, RMS ${view.rmse.map(v => v.toFixed(2)).join(' / ')} of 255 (R / G / B)` : '';
+    setText(this.error, `difference, ${kDifferenceGain} times as bright${rmse}`);
+    if (both) void this.subtract(view, view.captured!, view.rendered!);
+  }
+
+  private async subtract(view: View, captured: string, rendered: string): Promise<void> {
     const [a, b] = await Promise.all([pixels(captured), pixels(rendered)]);
-    if (index !== this.shown || a.width !== b.width || a.height !== b.height) return;
+    if (view !== this.views[this.shown] || a.width !== b.width || a.height !== b.height) return;
     Object.assign(this.apart, {width: a.width, height: a.height});
     this.apart.getContext('2d')!.putImageData(new ImageData(difference(a.data, b.data, kDifferenceGain) as Uint8ClampedArray<ArrayBuffer>, a.width, a.height), 0, 0);
-    set(this.apart, 'data-view', index);
+    set(this.apart, 'data-view', this.shown);
   }
 }

@@ -20,9 +20,17 @@ export interface Frame {
   edge: number;          // from point to point, metres
   origin: Triple;        // of point (0, 0, 0), metres
   channels: Channel[];
+  views: View[];         // of each camera, or none
 }
 
-/** A pinhole with OpenCV's axes: x right, y down, z forward. Pictures are data: addresses. */
+/** What a camera saw of a frame. Pictures are data: addresses of one size. */
+export interface View {
+  rmse: Triple | null;  // grey levels
+  captured: string | null;
+  rendered: string | null;
+}
+
+/** A pinhole with OpenCV's axes: x right, y down, z forward. */
 export interface FilmingCamera {
   name: string;
   role: 'input' | 'held_out';
@@ -31,9 +39,6 @@ export interface FilmingCamera {
   middle: readonly [number, number];
   rotation: readonly number[];        // of camera from world, row by row
   translation: Triple;
-  rmse: Triple | null;                // grey levels
-  captured: string | null;
-  rendered: string | null;
 }
 
 export interface TracePoint {

@@ -1,24 +1,21 @@
 // SPDX-License-Identifier: Apache-2.0
-// Draws a volume with WebGL 2.
-import {type Bricks, bricksOf, emptiness, filledPart, kCells} from './bricks';
+// What is drawn of a volume and how: what every renderer has in common.
+import {type Bricks, bricksOf, emptiness, filledPart} from './bricks';
 import type {Triple} from './contents';
 import {type Eye, seen} from './eye';
-import {kColour, kQuantity, kWhole} from './shaders';
 
 /** Light and what it loses, as a camera would see it: `gain` times as bright. */
 export interface ColourLook {
   mode: 'colour';
   gain: number;
 }
-/** A quantity from `low` on in the palette's colours from `darkest` (0..1) on; `depth`: what it takes of the light along the volume's
- *  longest edge (optical depth), at its highest, or `even` wherever it is told. Isotherms are at `levels`, which rise. */
+/** A quantity from `low` on in the palette's colours; `depth`: what it takes of the light along the volume's longest edge (optical
+ *  depth) where the palette is opaque. Isotherms are at `levels`, which rise. */
 export interface QuantityLook {
   mode: 'quantity';
   low: number;
   high: number;
   depth: number;
-  darkest: number;
-  even?: boolean;
   levels: readonly number[];
 }
 export type Look = ColourLook | QuantityLook;
@@ -29,44 +26,17 @@ export interface GridPlace {
   origin: Triple;
 }
 
-interface Program {
-  program: WebGLProgram;
-  at: (name: string) => WebGLUniformLocation | null;
-}
+/** What a ray gathers: light alone, or with what is lost of it; a quantity alone, or with its isotherms. */
+export type Kind = 'light' | 'absorbed' | 'quantity' | 'surfaces';
+export const kKinds: readonly Kind[] = ['light', 'absorbed', 'quantity', 'surfaces'];
 
-export function linked(gl: WebGL2RenderingContext, vertex: string, fragment: string): Program {
-  const program = gl.createProgram();
-  for (const [type, source] of [[gl.VERTEX_SHADER, vertex], [gl.FRAGMENT_SHADER, fragment]] as const) {
-    const shader = gl.createShader(type)!;
-    gl.shaderSource(shader, source.replaceAll('CELLS', String(kCells)));
-    gl.compileShader(shader);
-    if (!gl.getShaderParameter(shader, gl.COMPILE_STATUS)) throw new Error(`a shader: ${gl.getShaderInfoLog(shader) ?? 'lost'}`);
-    gl.attachShader(program, shader);
-  }
-  gl.linkProgram(program);
-  if (!gl.getProgramParameter(program, gl.LINK_STATUS)) throw new Error(`shaders: ${gl.getProgramInfoLog(program) ?? 'lost'}`);
-  const places = new Map<string, WebGLUniformLocation | null>();
-  return {program, at: name => {
-    if (!places.has(name)) places.set(name, gl.getUniformLocation(program, name));
-    return places.get(name)!;
-  }};
-}
+/** Of a picture: left, top, width and height, pixels. */
+export type Part = readonly [number, number, number, number];
 
-/** As texture units. */
-const kValues = 0;
-const kEmptiness = 1;
-const kPalette = 2;
+/** Vectors of four that a shader is told: see asTold(). */
+export const kTold = 10;
 
-/** Whether there is no GPU. */
-function software(gl: WebGL2RenderingContext): boolean {
-  const told = gl.getExtension('WEBGL_debug_renderer_info');
-  return told !== null && /SwiftShader|llvmpipe|softpipe|Basic Render/i.test(String(gl.getParameter(told.UNMASKED_RENDERER_WEBGL)));
-}
-
-export class March {
-  private readonly programs = new Map<string, Program>();
-  private readonly values: WebGLTexture;
-  private readonly leaps: WebGLTexture;
+export abstract class March {
   private grid: GridPlace = {points: [2, 2, 2], edge: 1, origin: [0, 0, 0]};
   private bricks?: Bricks;
   private absorbs = false;
@@ -74,33 +44,17 @@ export class March {
   private unit = 1;  // of a quantity's values
   private over = NaN;
   private filled?: readonly [Triple, Triple];  // the corners of what isn't empty, in voxel edges
-  private readonly wholeFloats: boolean;
   /** Voxel edges from sample to sample, as `emberlock reconstruct --step` has it. */
   stride = 1;
 
-  constructor(readonly gl: WebGL2RenderingContext) {
-    const texture = (unit: number, target: GLenum, filter: GLenum) => {
-      const made = gl.createTexture();
-      gl.activeTexture(gl.TEXTURE0 + unit);
-      gl.bindTexture(target, made);
-      for (const name of [gl.TEXTURE_MIN_FILTER, gl.TEXTURE_MAG_FILTER]) gl.texParameteri(target, name, filter);
-      for (const name of [gl.TEXTURE_WRAP_S, gl.TEXTURE_WRAP_T, gl.TEXTURE_WRAP_R]) gl.texParameteri(target, name, gl.CLAMP_TO_EDGE);
-      return made;
-    };
-    this.wholeFloats = software(gl) && gl.getExtension('OES_texture_float_linear') !== null;
-    gl.pixelStorei(gl.UNPACK_ALIGNMENT, 1);
-    this.values = texture(kValues, gl.TEXTURE_3D, gl.LINEAR);
-    this.leaps = texture(kEmptiness, gl.TEXTURE_3D, gl.NEAREST);
-    texture(kPalette, gl.TEXTURE_2D, gl.LINEAR);
-  }
-
-  /** The colours of a quantity, from its lowest to its highest: red, green and blue, 0..255. */
-  setPalette(palette: readonly (readonly number[])[]): void {
-    const {gl} = this;
-    const bytes = Uint8Array.from(palette.flatMap(([red, green, blue]) => [red!, green!, blue!, 255]));
-    gl.activeTexture(gl.TEXTURE0 + kPalette);
-    gl.texImage2D(gl.TEXTURE_2D, 0, gl.RGBA8, palette.length, 1, 0, gl.RGBA, gl.UNSIGNED_BYTE, bytes);
-  }
+  abstract readonly name: string;
+  /** The colours of a quantity, from its lowest to its highest: red, green, blue and opacity of 256 values, 0..255. */
+  abstract setPalette(palette: readonly (readonly number[])[]): void;
+  protected abstract setValues(points: Triple, lanes: 2 | 3 | 4, texels: Float32Array): void;
+  /** For each brick how many away the next is that isn't empty. */
+  protected abstract setEmptiness(size: Triple, away: Uint8Array): void;
+  /** Light over what comes through of the picture at hand. */
+  protected abstract paint(kind: Kind, told: Float32Array, part: Part, width: number, height: number): void;
 
   /** Light in grey levels a metre, RGB at each point, and the extinction a metre where anything is lost. */
   setLight(grid: GridPlace, emission: Float32Array, extinction?: Float32Array): void {
@@ -137,56 +91,36 @@ export class March {
   }
 
   private take(grid: GridPlace, texels: Float32Array, lanes: 2 | 3 | 4, most: (point: number) => number): void {
-    const {gl} = this;
     this.grid = grid;
     this.bricks = bricksOf(grid.points, most);
     this.over = NaN;
-    gl.activeTexture(gl.TEXTURE0 + kValues);
-    gl.bindTexture(gl.TEXTURE_3D, this.values);
-    // Halves take half the memory, and show more than a screen does; without a GPU each would be converted at each look.
-    const [half, whole, format] = {2: [gl.RG16F, gl.RG32F, gl.RG], 3: [gl.RGB16F, gl.RGB32F, gl.RGB], 4: [gl.RGBA16F, gl.RGBA32F, gl.RGBA]}[lanes];
-    gl.texImage3D(gl.TEXTURE_3D, 0, (this.wholeFloats ? whole : half)!, ...grid.points, 0, format!, gl.FLOAT, texels);
+    this.setValues(grid.points, lanes, texels);
   }
 
   /** Over what is in the picture already. */
   draw(eye: Eye, look: Look, width: number, height: number): void {
-    const {gl, grid} = this;
     if (!this.bricks) return;
-    this.look(look);
+    this.leapOver(look);
     const part = this.partOf(eye, width, height);
     if (!part) return;
-    const {program, at} = this.program(look);
-    gl.useProgram(program);
-    gl.uniform1i(at('values'), kValues);
-    gl.uniform1i(at('emptiness'), kEmptiness);
-    gl.uniform1i(at('colours'), kPalette);
-    gl.uniform3f(at('points'), ...grid.points);
-    gl.uniform3i(at('bricks'), ...this.bricks.size);
-    const place = [0, 1, 2].map(axis => (eye.place[axis]! - grid.origin[axis]!) / grid.edge) as [number, number, number];
-    gl.uniform3f(at('eye'), ...place);
-    gl.uniformMatrix3fv(at('axes'), false, [...eye.right, ...eye.down, ...eye.forward]);
-    gl.uniform4f(at('lens'), ...eye.focal, ...eye.middle);
-    gl.uniform1f(at('rows'), height);
-    gl.uniform1f(at('stride'), this.stride);
-    gl.uniform4fv(at('scale'), this.scale as number[]);
-    if (look.mode === 'colour') gl.uniform4f(at('range'), look.gain, 0, 0, 0);
-    else {
-      const [low, high] = [look.low / this.unit, look.high / this.unit];
-      gl.uniform1f(at('even'), look.even ? 1 : 0);
-      gl.uniform4f(at('range'), low, Math.max(high, low + 1e-6), look.depth / Math.max(...grid.points), look.darkest);
-      gl.uniform4f(at('levels'), ...([0, 1, 2, 3].map(n => (look.levels[n] ?? 1e30) / this.unit) as [number, number, number, number]));
-    }
-    gl.viewport(0, 0, width, height);
-    gl.enable(gl.BLEND);
-    gl.blendFuncSeparate(gl.ONE, gl.SRC_ALPHA, gl.ZERO, gl.ONE);  // light over what comes through
-    gl.enable(gl.SCISSOR_TEST);
-    gl.scissor(...part);
-    gl.drawArrays(gl.TRIANGLES, 0, 3);
-    gl.disable(gl.SCISSOR_TEST);
+    const kind = look.mode === 'colour' ? (this.absorbs ? 'absorbed' : 'light') : look.levels.length > 0 ? 'surfaces' : 'quantity';
+    this.paint(kind, this.asTold(eye, look, height), part, width, height);
   }
 
-  /** Left, bottom, width and height of the picture's part in which what isn't empty is seen. */
-  private partOf(eye: Eye, width: number, height: number): [number, number, number, number] | undefined {
+  /** In this order: the eye's place, and the picture's rows; right, and the stride; down; forward; focal lengths and principal point;
+   *  key points; bricks; what values are times; low, high and depth, or brightness; isotherms, beyond all values where they aren't used. */
+  private asTold(eye: Eye, look: Look, rows: number): Float32Array {
+    const {grid, unit} = this;
+    const place = [0, 1, 2].map(axis => (eye.place[axis]! - grid.origin[axis]!) / grid.edge);
+    const low = look.mode === 'colour' ? look.gain : look.low / unit;
+    const [high, depth, levels] = look.mode === 'colour' ? [0, 0, []] : [Math.max(look.high / unit, low + 1e-6), look.depth / Math.max(...grid.points), look.levels];
+    return Float32Array.from([
+      ...place, rows, ...eye.right, this.stride, ...eye.down, 0, ...eye.forward, 0, ...eye.focal, ...eye.middle, ...grid.points, 0, ...this.bricks!.size, 0,
+      ...this.scale, low, high, depth, 0, ...[0, 1, 2, 3].map(n => (levels[n] ?? 1e30) / unit)]);
+  }
+
+  /** Left, top, width and height of the picture's part in which what isn't empty is seen. */
+  private partOf(eye: Eye, width: number, height: number): Part | undefined {
     if (!this.filled) return undefined;
     const {grid, filled} = this;
     const corners = Array.from({length: 8}, (_, n) =>
@@ -196,28 +130,16 @@ export class March {
     const within = (value: number, most: number) => Math.max(0, Math.min(most, value));
     const [x0, x1] = [within(Math.floor(left) - 1, width), within(Math.ceil(right) + 1, width)];
     const [y0, y1] = [within(Math.floor(top) - 1, height), within(Math.ceil(bottom) + 1, height)];
-    return x1 > x0 && y1 > y0 ? [x0, height - y1, x1 - x0, y1 - y0] : undefined;
+    return x1 > x0 && y1 > y0 ? [x0, y0, x1 - x0, y1 - y0] : undefined;
   }
 
-  private program(look: Look): Program {
-    const [key, source] = look.mode === 'colour'
-      ? [`colour ${this.absorbs}`, kColour(this.absorbs)]
-      : [`quantity ${look.levels.length > 0}`, kQuantity(look.levels.length > 0)];
-    let made = this.programs.get(key);
-    if (!made) this.programs.set(key, (made = linked(this.gl, kWhole, source)));
-    return made;
-  }
-
-  /** What is leapt over: where there is no light, or where nothing is above what is shown. */
-  private look(look: Look): void {
+  /** Where there is no light, or where nothing is above what is shown. */
+  private leapOver(look: Look): void {
     const over = look.mode === 'colour' ? 0 : Math.max(0, Math.min(look.low, ...look.levels)) / this.unit;
     if (over === this.over) return;
     this.over = over;
     this.filled = filledPart(this.bricks!, over);
-    const {gl} = this;
-    gl.activeTexture(gl.TEXTURE0 + kEmptiness);
-    gl.bindTexture(gl.TEXTURE_3D, this.leaps);
-    gl.texImage3D(gl.TEXTURE_3D, 0, gl.R8UI, ...this.bricks!.size, 0, gl.RED_INTEGER, gl.UNSIGNED_BYTE, emptiness(this.bricks!, over));
+    this.setEmptiness(this.bricks!.size, emptiness(this.bricks!, over));
   }
 }
 

@@ -1,9 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // The page of `emberlock view`: a result's volumes, cameras and errors. Needs no server.
 import {el, set, setText, show} from '../dom';
-import {heat} from '../layers';
 import {Plot} from '../plot';
-import {Compare} from './compare';
+import {Compare, errorOf} from './compare';
 import {type Contents, type Frame, readFrame, type Triple, type Values} from './contents';
 import {eyeOf, Orbit, placeOf} from './eye';
 import {save, screenshot, turntable} from './film';
@@ -31,13 +30,27 @@ class Reader {
   }
 }
 
+const kInput = {name: 'input views', colour: '#56b4e9'};
+const kHeldOut = {name: 'held-out views', colour: '#e69f00'};
+
+/** Which frames of a sequence are worse. */
+function errorOfFrames({frames, cameras}: Contents): HTMLElement {
+  const plot = new Plot('Error of each frame');
+  const [input, heldOut] = (['input', 'held_out'] as const).map(role => frames.map(frame => errorOf(frame, cameras, role))) as [(number | null)[], (number | null)[]];
+  const part = el('section', {class: 'part', 'aria-label': 'Error of each frame'}, el('h2', {}, 'Error of each frame'), plot.root);
+  const lines = [{line: kInput, values: input}, {line: kHeldOut, values: heldOut}].filter(({values}) => values.some(value => value !== null));
+  show(part, frames.length > 1 && lines.length > 0);
+  if (!part.hidden) plot.show({x: 'frame', y: 'error, grey levels', lines: lines.map(({line}) => line)}, [frames.map(({frame}, n) => frame ?? n), ...lines.map(({values}) => values)]);
+  return part;
+}
+
 function errorAgainstTime({trace}: Contents): HTMLElement {
   const plot = new Plot('Error against time');
   const part = el('section', {class: 'part', 'aria-label': 'Error against time'}, el('h2', {}, 'Error against time'), plot.root);
   const heldOut = trace.some(point => point.held_out !== null);
   show(part, trace.length > 0);
   if (trace.length > 0) {
-    plot.show({x: 'seconds', y: 'error, grey levels', lines: [{name: 'input views', colour: '#56b4e9'}, ...(heldOut ? [{name: 'held-out views', colour: '#e69f00'}] : [])]},
+    plot.show({x: 'seconds', y: 'error, grey levels', lines: [kInput, ...(heldOut ? [kHeldOut] : [])]},
               [trace.map(point => point.seconds), trace.map(point => point.input), ...(heldOut ? [trace.map(point => point.held_out)] : [])]);
   }
   return part;
@@ -59,6 +72,7 @@ export class ResultPage {
   private readonly film = el('button', {type: 'button', onclick: () => void this.record()}, 'Turntable video');
   private readonly withCameras = el('input', {type: 'checkbox', checked: true, onchange: () => this.stage.later()});
   private compare?: Compare;
+  private placed?: PlacedCameras;
   private at = 0;
   private playing = false;
   private recording = false;
@@ -75,7 +89,6 @@ export class ResultPage {
     this.reader = new Reader(contents.frames, block);
     this.orbit = new Orbit(middle, contents.up, reach);
     this.stage = new Stage(this.canvas, this.orbit);
-    this.stage.march.setPalette(Array.from({length: 256}, (_, value) => heat(value)));
     this.root = el('main', {class: 'viewer'});
     this.build(reach);
   }
@@ -85,6 +98,7 @@ export class ResultPage {
     if (cameras.length > 0) this.orbit.from(placeOf(cameras[0]!));
     const placed = new PlacedCameras(this.stage.gl, cameras, 0.35 * reach, () => this.stage.later());
     this.stage.company.push({draw: (...told) => { if (this.withCameras.checked && !this.stage.fixed) placed.draw(...told); }});
+    this.placed = placed;
     this.compare = new Compare(cameras, index => { placed.chosen = index; this.stage.later(); }, index => this.lookFrom(index));
     this.stage.tapped = (eye, x, y) => {
       const camera = this.withCameras.checked ? placed.at(eye, x, y, 30) : -1;
@@ -102,7 +116,7 @@ export class ResultPage {
         el('section', {class: 'part', 'aria-label': 'The volume'}, this.canvas, player),
         el('section', {class: 'part knobs', 'aria-label': 'How it is shown'}, this.quantities.root, cameraBox, el('p', {class: 'line'}, around, shot, this.film))),
       el('section', {class: 'part', 'aria-label': 'Slices'}, el('h2', {}, 'Slices'), this.slices.root),
-      this.compare.root, errorAgainstTime(this.contents));
+      this.compare.root, errorOfFrames(this.contents), errorAgainstTime(this.contents));
   }
 
   private fail(error: unknown): void {
@@ -112,6 +126,9 @@ export class ResultPage {
 
   /** The first picture is there when this is done. */
   async start(): Promise<void> {
+    void this.reader.get(0).catch(() => undefined);  // meanwhile; load() tells what is wrong
+    await this.stage.chosen;
+    this.stage.renewed = () => void this.load(false);
     await this.load(true);
   }
 
@@ -133,6 +150,8 @@ export class ResultPage {
       setText(this.note, `${nx - 1} × ${ny - 1} × ${nz - 1} voxels of ${(1000 * frame.edge).toFixed(2)} mm${this.contents.input ? `, from ${this.contents.input}` : ''}`);
       setText(this.frameLabel, frame.frame === null ? '' : `frame ${frame.frame}`);
       this.sliced = {frame, values: single(values.get(name)!, channel.lanes), unit: channel.unit};
+      this.compare?.show(frame.views);
+      if (!this.playing) this.placed?.show(frame.views);
       this.redraw();
       this.stage.draw();
       set(this.canvas, 'data-shown', `${this.at} ${name}`);
@@ -147,6 +166,8 @@ export class ResultPage {
     if (!this.sliced) return;
     const {frame, values, unit} = this.sliced;
     const [low, high] = this.quantities.range;
+    this.quantities.transfer.show(values, low, high);
+    this.stage.march.setPalette(this.quantities.transfer.palette);
     const levels = this.quantities.chosen === 'emission' ? [] : this.quantities.levels;
     this.slices.show({grid: frame, values, unit, low, high, levels});
   }
@@ -173,6 +194,7 @@ export class ResultPage {
       await this.goTo((this.at + 1) % this.contents.frames.length);
       await new Promise(resolve => setTimeout(resolve, Math.max(0, due - performance.now())));
     }
+    this.placed?.show(this.contents.frames[this.at]!.views);  // too many to be decoded in between
   }
 
   private async record(): Promise<void> {

@@ -1,15 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
 // The cameras that filmed, in space: a pyramid of lines each, with its picture at the base.
-import type {FilmingCamera, Triple} from './contents';
+import type {FilmingCamera, Triple, View} from './contents';
 import {add, dot, type Eye, placeOf, seen} from './eye';
-import {linked} from './march';
+import {linked} from './march_gl';
 import {kLines, kPicture, kPlaced} from './shaders';
 
 interface Placed {
   camera: FilmingCamera;
   place: Triple;
   corners: Triple[];  // of the picture: top left, top right, bottom right, bottom left
-  picture?: WebGLTexture;
+  address?: string | undefined;  // of the picture that is wanted
+  picture?: WebGLTexture | undefined;
 }
 
 const kPictureUnit = 3;
@@ -22,7 +23,7 @@ export class PlacedCameras {
   chosen = -1;
 
   /** `reach`: how long their pyramids are, metres. `changed` is called when a picture has come. */
-  constructor(private readonly gl: WebGL2RenderingContext, cameras: readonly FilmingCamera[], reach: number, changed: () => void) {
+  constructor(private readonly gl: WebGL2RenderingContext, cameras: readonly FilmingCamera[], reach: number, private readonly changed: () => void) {
     this.pictures = linked(gl, kPlaced, kPicture);
     this.lines = linked(gl, kPlaced, kLines);
     this.buffer = gl.createBuffer();
@@ -34,16 +35,36 @@ export class PlacedCameras {
         const r = camera.rotation;
         return [0, 1, 2].map(axis => place[axis]! + reach * (r[axis]! * way[0] + r[3 + axis]! * way[1] + r[6 + axis]!)) as unknown as Triple;
       });
-      const one: Placed = {camera, place, corners};
-      if (camera.captured) this.load(camera.captured).then(picture => { one.picture = picture; changed(); }, () => undefined);
-      return one;
+      return {camera, place, corners};
     });
   }
 
-  private async load(address: string): Promise<WebGLTexture> {
+  /** A frame's pictures, as soon as each is there. */
+  show(views: readonly View[]): void {
+    this.placed.forEach((one, n) => {
+      const address = views[n]?.captured ?? undefined;
+      if (address === one.address) return;
+      one.address = address;
+      if (address) void this.load(one, address);
+      else this.put(one, undefined);
+    });
+  }
+
+  private put(one: Placed, picture: WebGLTexture | undefined): void {
+    if (one.picture) this.gl.deleteTexture(one.picture);
+    one.picture = picture;
+    this.changed();
+  }
+
+  private async load(one: Placed, address: string): Promise<void> {
     const image = new Image();
     image.src = address;
-    await image.decode();
+    await image.decode().catch(() => undefined);
+    if (one.address !== address) return;  // another one is wanted by now
+    this.put(one, image.naturalWidth > 0 ? this.textureOf(image) : undefined);
+  }
+
+  private textureOf(image: HTMLImageElement): WebGLTexture {
     const {gl} = this;
     const texture = gl.createTexture();
     gl.activeTexture(gl.TEXTURE0 + kPictureUnit);

@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-// What can be shown of a frame, and the controls of how: range, opacity, isotherms.
+// What can be shown of a frame, and the controls of how: range, opacity and its curve, isotherms.
 import {el, set, setText, show} from '../dom';
 import type {Frame, Values} from './contents';
 import type {Look} from './march';
 import {words} from './slices';
+import {Transfer} from './transfer';
 
 const kNames: Record<string, string> = {
   emission: 'Colour', density: 'Extinction', temperature: 'Temperature', temperature_sigma: 'Error of the temperature',
@@ -36,6 +37,7 @@ export class Quantities {
   private readonly high = this.knob('Highest value in colour', kSteps);
   private readonly depth = this.knob('Opacity', 200);
   private readonly count = this.knob('How many isotherms', 0, 0, kMostLevels);
+  readonly transfer = new Transfer(() => this.changed(false));
   private readonly said = new Map<HTMLInputElement, HTMLElement>();
   private readonly ofColour: HTMLElement;
   private readonly ofQuantity: HTMLElement;
@@ -53,7 +55,7 @@ export class Quantities {
     this.ofColour = el('div', {class: 'knobs'}, row('Brightness', this.gain));
     this.ofQuantity = el('div', {class: 'knobs'},
       el('p', {class: 'colour-bar'}, this.bar.low, el('span', {class: 'colours', role: 'img', 'aria-label': 'from dark to bright'}), this.bar.high),
-      row('From', this.low), row('To', this.high), row('Opacity', this.depth), row('Isotherms', this.count));
+      this.transfer.root, row('From', this.low), row('To', this.high), row('Opacity', this.depth), row('Isotherms', this.count));
     this.root = el('div', {class: 'knobs'}, el('label', {}, 'Show ', this.select), this.ofColour, this.ofQuantity);
   }
 
@@ -104,7 +106,7 @@ export class Quantities {
   get look(): Look {
     if (this.chosen === 'emission') return {mode: 'colour', gain: 2 ** (this.gain.valueAsNumber / 10)};
     const [low, high] = this.range;
-    return {mode: 'quantity', low, high, depth: this.depth.valueAsNumber === 0 ? 0 : 0.1 * 10 ** (this.depth.valueAsNumber / 100), darkest: 0.15, levels: this.levels};
+    return {mode: 'quantity', low, high, depth: this.depth.valueAsNumber === 0 ? 0 : 0.1 * 10 ** (this.depth.valueAsNumber / 100), levels: this.levels};
   }
 
   private choose(name: string): void {

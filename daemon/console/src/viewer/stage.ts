@@ -1,8 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 // The canvas in which the volume stands: what is drawn and when, and how it is turned by mouse, fingers and keys.
+import {set} from '../dom';
 import type {Triple} from './contents';
 import type {Eye, Orbit} from './eye';
-import {type Look, March} from './march';
+import type {Look, March} from './march';
+import {GlMarch} from './march_gl';
+import {gpuMarch} from './march_gpu';
 
 /** What else is drawn, before the volume and over it. */
 export interface Company {
@@ -13,11 +16,18 @@ const kKeys: Record<string, readonly [number, number, number]> = {
   ArrowLeft: [-5, 0, 1], ArrowRight: [5, 0, 1], ArrowUp: [0, 5, 1], ArrowDown: [0, -5, 1], '+': [0, 0, 1.2], '=': [0, 0, 1.2], '-': [0, 0, 1 / 1.2],
 };
 const kSlow = 70;     // ms a picture: while it is moved, slower ones get fewer pixels
+const kLate = 1000;   // ms until WebGPU is no longer waited for
+const kForced = 30_000;
 const kRest = 200;    // ms without a movement: then all pixels
 
 export class Stage {
   readonly gl: WebGL2RenderingContext;
-  readonly march: March;
+  /** By WebGL 2, or by WebGPU where that answers. */
+  march: March;
+  /** Told when `march` is another one, which has no values yet. */
+  renewed: () => void = () => undefined;
+  /** When it is settled which one draws. */
+  readonly chosen: Promise<void>;
   readonly company: Company[] = [];
   look: Look = {mode: 'colour', gain: 1};
   /** As a camera sees it; turning leaves it. */
@@ -34,9 +44,32 @@ export class Stage {
     const gl = canvas.getContext('webgl2', {antialias: false, alpha: false, preserveDrawingBuffer: true});
     if (!gl) throw new Error('this browser has no WebGL 2');
     this.gl = gl;
-    this.march = new March(gl);
+    this.march = new GlMarch(gl);
+    this.chosen = this.choose();
     new ResizeObserver(() => this.later()).observe(canvas);
     this.listen();
+  }
+
+  /** `?renderer=webgl` in the page's address, or `webgpu`, also by software, has its way. What doesn't answer soon isn't waited for. */
+  private async choose(): Promise<void> {
+    const wish = new URLSearchParams(location.search).get('renderer');
+    const plain = this.march;
+    let lost = false;
+    const failed = () => {
+      lost = true;
+      if (this.march !== plain) this.take(plain);
+    };
+    set(this.canvas, 'data-renderer', plain.name);
+    if (wish === 'webgl') return;
+    const late = new Promise<undefined>(resolve => setTimeout(resolve, wish === 'webgpu' ? kForced : kLate));
+    const march = await Promise.race([gpuMarch(this.gl, wish === 'webgpu', failed), late]);
+    if (march && !lost) this.take(march);
+  }
+
+  private take(march: March): void {
+    this.march = march;
+    set(this.canvas, 'data-renderer', march.name);
+    this.renewed();
   }
 
   /** Soon, at once for all that changes until then. */

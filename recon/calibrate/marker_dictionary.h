@@ -1,0 +1,23 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include <opencv2/aruco.hpp>
+
+#include "base/image.h"
+
+namespace emberlock::recon {
+
+// What searches with OpenCV share.
+
+/// A dictionary of ArUco markers by OpenCV's name, "4X4_50" or "DICT_4X4_50" in any case. Null: there is
+/// none.
+cv::Ptr<cv::aruco::Dictionary> marker_dictionary(std::string_view name);
+
+/// The picture as 8-bit grey, with its white at 255.
+cv::Mat grey_of(const ImageView& picture);
+
+}  // namespace emberlock::recon

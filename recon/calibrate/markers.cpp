@@ -1,0 +1,283 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "recon/calibrate/markers.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include <Eigen/Dense>
+#include <opencv2/imgproc.hpp>
+
+#include "recon/calibrate/marker_dictionary.h"
+
+namespace emberlock::recon {
+namespace {
+
+constexpr std::array<std::pair<const char*, cv::aruco::PREDEFINED_DICTIONARY_NAME>, 17> kDictionaries = {{
+    {"4X4_50", cv::aruco::DICT_4X4_50},
+    {"4X4_100", cv::aruco::DICT_4X4_100},
+    {"4X4_250", cv::aruco::DICT_4X4_250},
+    {"4X4_1000", cv::aruco::DICT_4X4_1000},
+    {"5X5_50", cv::aruco::DICT_5X5_50},
+    {"5X5_100", cv::aruco::DICT_5X5_100},
+    {"5X5_250", cv::aruco::DICT_5X5_250},
+    {"5X5_1000", cv::aruco::DICT_5X5_1000},
+    {"6X6_50", cv::aruco::DICT_6X6_50},
+    {"6X6_100", cv::aruco::DICT_6X6_100},
+    {"6X6_250", cv::aruco::DICT_6X6_250},
+    {"6X6_1000", cv::aruco::DICT_6X6_1000},
+    {"7X7_50", cv::aruco::DICT_7X7_50},
+    {"7X7_100", cv::aruco::DICT_7X7_100},
+    {"7X7_250", cv::aruco::DICT_7X7_250},
+    {"7X7_1000", cv::aruco::DICT_7X7_1000},
+    {"ORIGINAL", cv::aruco::DICT_ARUCO_ORIGINAL},
+}};
+
+/// A grey picture's light between pixels; coordinates count from the centre of the first pixel.
+class Brightness {
+ public:
+  Brightness(const cv::Mat& grey, const std::array<float, 256>* light) : grey_(grey), light_(light) {}
+  [[nodiscard]] bool covers(const Eigen::Vector2d& p) const {
+    return p.x() >= 0 && p.y() >= 0 && p.x() < grey_.cols - 1 && p.y() < grey_.rows - 1;
+  }
+  [[nodiscard]] double at(const Eigen::Vector2d& p) const {
+    const auto x = static_cast<int>(p.x());
+    const auto y = static_cast<int>(p.y());
+    const double fx = p.x() - x;
+    const double fy = p.y() - y;
+    return (1 - fy) * ((1 - fx) * of(x, y) + fx * of(x + 1, y)) +
+           fy * ((1 - fx) * of(x, y + 1) + fx * of(x + 1, y + 1));
+  }
+
+ private:
+  [[nodiscard]] double of(int x, int y) const {
+    const std::uint8_t level = grey_.at<std::uint8_t>(y, x);
+    return light_ != nullptr ? static_cast<double>((*light_)[level]) : level;
+  }
+  const cv::Mat& grey_;
+  const std::array<float, 256>* light_;
+};
+
+/// Where brightness crosses half way between black and white, along `outwards` (unit length) from a place
+/// near a side, pixels; nothing where no clear edge is within `reach` to either side.
+std::optional<double> crossing(const Brightness& picture, const Eigen::Vector2d& place,
+                               const Eigen::Vector2d& outwards, double reach) {
+  constexpr double kStep = 0.25;
+  constexpr int kMost = 96;
+  const int half = std::clamp(static_cast<int>(reach / kStep), 4, kMost / 2);
+  if (!picture.covers(place - half * kStep * outwards) || !picture.covers(place + half * kStep * outwards))
+    return {};
+  std::array<double, kMost + 1> level{};
+  for (int i = -half; i <= half; ++i)
+    level[static_cast<std::size_t>(i + half)] = picture.at(place + i * kStep * outwards);
+  const auto mean = [&](int from) {
+    return (level[static_cast<std::size_t>(from)] + level[static_cast<std::size_t>(from + 1)]) / 2;
+  };
+  const double dark = mean(0);
+  const double bright = mean(2 * half - 1);
+  if (!(bright > dark)) return {};
+  const double middle = (dark + bright) / 2;
+  std::optional<double> nearest;
+  for (int i = 0; i < 2 * half; ++i) {
+    const double a = level[static_cast<std::size_t>(i)];
+    const double b = level[static_cast<std::size_t>(i + 1)];
+    if (!(a <= middle && b > middle)) continue;
+    const double at = (i - half + (middle - a) / (b - a)) * kStep;
+    if (!nearest || std::abs(at) < std::abs(*nearest)) nearest = at;
+  }
+  return nearest;
+}
+
+/// A line n . p = c in the undistorted picture.
+struct SideLine {
+  Eigen::Vector2d normal;
+  double offset = 0;
+};
+
+/// Through most of the places: those farther away than twice the middle distance are left out once.
+std::optional<SideLine> line_through(const std::vector<Eigen::Vector2d>& places) {
+  constexpr std::size_t kFewest = 4;
+  std::vector<Eigen::Vector2d> kept = places;
+  SideLine line;
+  for (int round = 0; round < 2; ++round) {
+    if (kept.size() < kFewest) return {};
+    Eigen::Vector2d middle = Eigen::Vector2d::Zero();
+    for (const Eigen::Vector2d& p : kept) middle += p / static_cast<double>(kept.size());
+    Eigen::Matrix2d spread = Eigen::Matrix2d::Zero();
+    for (const Eigen::Vector2d& p : kept) spread += (p - middle) * (p - middle).transpose();
+    const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> axes(spread);
+    line = {axes.eigenvectors().col(0), axes.eigenvectors().col(0).dot(middle)};
+    std::vector<double> away;
+    for (const Eigen::Vector2d& p : kept) away.push_back(std::abs(line.normal.dot(p) - line.offset));
+    std::vector<double> sorted = away;
+    std::nth_element(sorted.begin(), sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2),
+                     sorted.end());
+    const double most = 2 * sorted[sorted.size() / 2] + 1e-9;
+    std::vector<Eigen::Vector2d> near;
+    for (std::size_t i = 0; i < kept.size(); ++i)
+      if (away[i] <= most) near.push_back(kept[i]);
+    kept = std::move(near);
+  }
+  return line;
+}
+
+std::optional<Eigen::Vector2d> meet(const SideLine& a, const SideLine& b) {
+  Eigen::Matrix2d both;
+  both << a.normal.transpose(), b.normal.transpose();
+  if (!(std::abs(both.determinant()) > 0.05)) return {};
+  return both.inverse() * Eigen::Vector2d(a.offset, b.offset);
+}
+
+/// A pixel where the lens would have put it without distortion, and back.
+class Undistorted {
+ public:
+  explicit Undistorted(const Intrinsics& lens) : lens_(lens) {}
+  [[nodiscard]] Eigen::Vector2d operator()(const Eigen::Vector2d& pixel) const {
+    double x = (pixel.x() - lens_.cx) / lens_.fx;
+    double y = (pixel.y() - lens_.cy) / lens_.fy;
+    lens_.distortion.undistort(x, y);
+    return {lens_.fx * x, lens_.fy * y};
+  }
+  [[nodiscard]] Eigen::Vector2d back(const Eigen::Vector2d& p) const {
+    double x = 0;
+    double y = 0;
+    lens_.distortion.distort(p.x() / lens_.fx, p.y() / lens_.fy, x, y);
+    return {lens_.fx * x + lens_.cx, lens_.fy * y + lens_.cy};
+  }
+
+ private:
+  const Intrinsics& lens_;
+};
+
+/// The corners where the sides meet; as they were where a side isn't clear enough.
+void meet_sides(const Brightness& picture, const Undistorted& undistorted, int cells, SeenMarker& marker) {
+  constexpr int kAlong = 24;
+  constexpr double kHalfPixel = 0.5;  // OpenCV counts from pixel centres
+  const Eigen::Vector2d half = Eigen::Vector2d::Constant(kHalfPixel);
+  std::array<std::optional<SideLine>, 4> sides;
+  Eigen::Vector2d middle = Eigen::Vector2d::Zero();
+  for (const Eigen::Vector2d& corner : marker.corners) middle += corner / 4;
+  for (std::size_t s = 0; s < 4; ++s) {
+    const Eigen::Vector2d from = marker.corners[s];
+    const Eigen::Vector2d along = marker.corners[(s + 1) % 4] - from;
+    Eigen::Vector2d outwards(along.y(), -along.x());
+    outwards.normalize();
+    if (outwards.dot(from - middle) < 0) outwards = -outwards;
+    // Neither to the first cells of the pattern nor beyond a white margin of as much.
+    const double across = 2 * outwards.dot(from + along / 2 - middle) / cells;
+    const double reach = std::clamp(0.7 * across, 1.5, 8.0);
+    std::vector<Eigen::Vector2d> places;
+    for (int i = 0; i < kAlong; ++i) {
+      const double share = 0.08 + 0.84 * (i + 0.5) / kAlong;  // corners are blurred along both sides
+      const Eigen::Vector2d place = from + share * along - half;
+      if (const auto off = crossing(picture, place, outwards, reach))
+        places.push_back(undistorted(place + *off * outwards + half));
+    }
+    sides[s] = line_through(places);
+  }
+  constexpr double kFarthest = 3;  // pixels from where OpenCV saw it
+  std::array<Eigen::Vector2d, 4> corners = marker.corners;
+  for (std::size_t s = 0; s < 4; ++s) {
+    const auto& before = sides[(s + 3) % 4];
+    if (!before || !sides[s]) continue;
+    const auto corner = meet(*before, *sides[s]);
+    if (!corner) continue;
+    const Eigen::Vector2d pixel = undistorted.back(*corner);
+    if ((pixel - corners[s]).norm() < kFarthest) corners[s] = pixel;
+  }
+  marker.corners = corners;
+}
+
+}  // namespace
+
+const std::vector<std::string>& marker_dictionaries() {
+  static const std::vector<std::string> names = [] {
+    std::vector<std::string> all;
+    for (const auto& entry : kDictionaries) all.emplace_back(entry.first);
+    return all;
+  }();
+  return names;
+}
+
+std::optional<std::string> marker_dictionary_name(std::string_view name) {
+  std::string upper(name);
+  std::transform(upper.begin(), upper.end(), upper.begin(),
+                 [](unsigned char c) { return static_cast<char>(std::toupper(c)); });
+  if (upper.starts_with("DICT_")) upper.erase(0, 5);
+  if (upper == "ARUCO_ORIGINAL") upper = "ORIGINAL";
+  const auto& names = marker_dictionaries();
+  if (std::find(names.begin(), names.end(), upper) == names.end()) return {};
+  return upper;
+}
+
+cv::Ptr<cv::aruco::Dictionary> marker_dictionary(std::string_view name) {
+  const auto known = marker_dictionary_name(name);
+  if (!known) return {};
+  for (const auto& entry : kDictionaries)
+    if (*known == entry.first) return cv::aruco::getPredefinedDictionary(entry.second);
+  return {};
+}
+
+int markers_in(const std::string& dictionary) {
+  const auto known = marker_dictionary(dictionary);
+  return known ? known->bytesList.rows : 0;
+}
+
+cv::Mat grey_of(const ImageView& picture) {
+  const auto& layout = picture.layout;
+  const bool wide = bytes_per_sample(layout.format) == 2;
+  const int depth = wide ? CV_16U : CV_8U;
+  // OpenCV doesn't write to it.
+  const cv::Mat raw(picture.height(), picture.width(), CV_MAKETYPE(depth, channels(layout.format)),
+                    const_cast<std::byte*>(picture.data),
+                    picture.stride);  // NOLINT(cppcoreguidelines-pro-type-const-cast)
+  cv::Mat grey;
+  if (is_bayer(layout.format)) {
+    cv::cvtColor(raw, grey,
+                 cv::COLOR_BayerBG2GRAY);  // RGGB; OpenCV's names start at the second pixel of the second row
+  } else if (channels(layout.format) == 3) {
+    cv::cvtColor(raw, grey, cv::COLOR_RGB2GRAY);
+  } else {
+    grey = raw;
+  }
+  cv::Mat result;
+  grey.convertTo(result, CV_8U, 255.0 / layout.white());
+  return result;
+}
+
+std::vector<SeenMarker> find_markers(const ImageView& picture, const std::string& dictionary,
+                                     const Intrinsics& lens, const std::array<float, 256>* light) {
+  const auto known = marker_dictionary(dictionary);
+  constexpr int kSmallest = 16;
+  if (!known || std::min(picture.width(), picture.height()) < kSmallest) return {};
+  const cv::Mat grey = grey_of(picture);
+  std::vector<std::vector<cv::Point2f>> quads;
+  std::vector<int> ids;
+  cv::aruco::detectMarkers(grey, known, quads, ids, cv::aruco::DetectorParameters::create());
+  const Brightness brightness(grey, light);
+  const Undistorted undistorted(lens);
+  std::vector<SeenMarker> markers;
+  for (std::size_t m = 0; m < ids.size(); ++m) {
+    SeenMarker marker{ids[m], {}};
+    for (std::size_t c = 0; c < 4; ++c)
+      marker.corners[c] = {static_cast<double>(quads[m][c].x) + 0.5,
+                           static_cast<double>(quads[m][c].y) + 0.5};
+    meet_sides(brightness, undistorted, known->markerSize + 2, marker);
+    markers.push_back(marker);
+  }
+  return markers;
+}
+
+Image draw_marker(const std::string& dictionary, int id, int cell) {
+  const auto known = marker_dictionary(dictionary);
+  const int cells = known->markerSize + 2;
+  Image image({{(cells + 2) * cell, (cells + 2) * cell}, PixelFormat::gray8, 8});
+  cv::Mat all(image.layout().size.height, image.layout().size.width, CV_8U, image.bytes().data());
+  all.setTo(255);
+  cv::Mat drawn;
+  cv::aruco::drawMarker(known, id, cells * cell, drawn, 1);
+  drawn.copyTo(all(cv::Rect(cell, cell, cells * cell, cells * cell)));
+  return image;
+}
+
+}  // namespace emberlock::recon

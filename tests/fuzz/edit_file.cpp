@@ -1,0 +1,23 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "apply/edit_file.h"
+
+#include <cstddef>
+#include <cstdint>
+#include <cstdlib>
+#include <string_view>
+
+// An edit file: what is read from it can be written and read again as the same, and stands; what can't has an
+// error that says where.
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  using namespace emberlock;
+  const auto edits = apply::parse_edits({reinterpret_cast<const char*>(data), size}, "fuzz.json", "");
+  if (!edits) {
+    if (edits.error().where.empty() || edits.error().kind != ErrorKind::bad_input) std::abort();
+    return 0;
+  }
+  if (!apply::standing(edits->steps)) std::abort();
+  const std::string text = apply::to_json(*edits);
+  const auto again = apply::parse_edits(text, "again.json", "");
+  if (!again || apply::to_json(*again) != text) std::abort();
+  return 0;
+}

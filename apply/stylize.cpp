@@ -158,11 +158,11 @@ EditFile Stylization::record() const {
   return {known_views(captured_), std::max({grid.nx, grid.ny, grid.nz}) - 1, passes_, colours_, steps_};
 }
 
-ShownVolume Stylization::shown() const {
-  return shown_volume(solve_->volume(), solve_->hull(), flame_, colours_, stand());
+EditedVolume Stylization::shown() const {
+  return edited_volume(solve_->volume(), solve_->hull(), flame_, colours_, stand());
 }
 
-recon::RadianceImage Stylization::preview(const ShownVolume& shown, std::size_t view, int widest) const {
+recon::RadianceImage Stylization::preview(const EditedVolume& shown, std::size_t view, int widest) const {
   const recon::View& seen = captured_.views[view];
   const ImageSize size = recon::preview_size(seen.image->size, widest);
   recon::RenderOptions options{.compute = options_.compute};
@@ -191,7 +191,7 @@ Result<recon::Outcome> Stylization::outcome() try {
   report.voxel_choice = begun_.report.voxel_choice;
   report.input = begun_.report.input;
   report.up = begun_.report.up;
-  ShownVolume shown = this->shown();
+  EditedVolume shown = this->shown();
   outcome.renders.clear();
   for (std::size_t v = 0; v < scene.scene().views.size(); ++v)
     outcome.renders.push_back(preview(shown, v, scene.scene().views[v].image->size.width));

@@ -47,9 +47,9 @@ class Stylization {
   /// With the pictures as edited.
   [[nodiscard]] const recon::Scene& scene() const { return edited_; }
   /// After the last pass, as the operations have it shown.
-  [[nodiscard]] ShownVolume shown() const;
+  [[nodiscard]] EditedVolume shown() const;
   /// The same seen by a view's camera, at most so many pixels wide, in grey levels.
-  [[nodiscard]] recon::RadianceImage preview(const ShownVolume& shown, std::size_t view, int widest) const;
+  [[nodiscard]] recon::RadianceImage preview(const EditedVolume& shown, std::size_t view, int widest) const;
   /// The report tells how the edited pictures are fitted; volume, temperatures and renderings are as shown.
   /// Applies steps of which no pass was done yet.
   Result<recon::Outcome> outcome();

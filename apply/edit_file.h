@@ -142,12 +142,25 @@ Result<EditFile> read_edits(const std::filesystem::path& file);
 /// An operation alone, a step without its pass.
 Result<Operation> parse_operation(std::string_view text, const std::string& where,
                                   const std::filesystem::path& folder);
+/// The pictures of an object that came with it.
+struct GivenPictures {
+  std::filesystem::path file;
+  std::optional<std::filesystem::path> mask = {};
+};
+/// The same of somebody who may name no files: an object's pictures are those given, and a "file" or a "mask"
+/// is refused. Errors too: an object without a picture, or pictures without an object.
+Result<Operation> parse_foreign_operation(std::string_view text, const std::string& where,
+                                          const std::optional<GivenPictures>& given);
 /// What parse_edits() reads back to the bit; paths are written as they are.
 std::string to_json(const EditFile& edits);
 
-/// The operations that stand after all steps, oldest first, none of them undo or redo. Errors: as of
-/// parse_edits().
-Result<std::vector<const Operation*>> standing(const std::vector<Step>& steps);
+/// What has become of steps: their operations, none of them undo or redo.
+struct History {
+  std::vector<const Operation*> standing;  ///< oldest first
+  std::vector<const Operation*> undone;    ///< in the order in which they were undone
+};
+/// Errors: as of parse_edits().
+Result<History> history_of(const std::vector<Step>& steps);
 
 /// What a scene is known by.
 std::vector<KnownView> known_views(const recon::Scene& scene);

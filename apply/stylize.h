@@ -42,6 +42,7 @@ class Stylization {
   [[nodiscard]] int passes() const { return passes_; }
   /// Fitted rays' residual, as the last pass met it; RMS, grey levels.
   [[nodiscard]] double residual() const { return residual_; }
+  [[nodiscard]] History history() const;
   /// Every step so far, with this scene's views, voxels and as many passes as were done.
   [[nodiscard]] EditFile record() const;
   /// With the pictures as edited.
@@ -58,7 +59,6 @@ class Stylization {
   Stylization(const recon::Scene& scene, const recon::Outcome& from, const recon::SolveOptions& options,
               Colours colours, const recon::CameraResponse& response);
   [[nodiscard]] Result<recon::PreparedScene> prepared(const recon::Scene& scene) const;
-  [[nodiscard]] std::vector<const Operation*> stand() const;
   Status load(ObjectEdit& object);
   /// Brings pictures and dark regions to where the steps have them.
   Status bring_up();

@@ -15,7 +15,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     if (edits.error().where.empty() || edits.error().kind != ErrorKind::bad_input) std::abort();
     return 0;
   }
-  if (!apply::standing(edits->steps)) std::abort();
+  if (!apply::history_of(edits->steps)) std::abort();
   const std::string text = apply::to_json(*edits);
   const auto again = apply::parse_edits(text, "again.json", "");
   if (!again || apply::to_json(*again) != text) std::abort();

@@ -9,6 +9,7 @@
 #include <string_view>
 #include <utility>
 
+#include <Eigen/Core>
 #include <fmt/format.h>
 #include <poll.h>
 #include <unistd.h>
@@ -42,6 +43,16 @@ Result<fs::path> keep_picture(std::string_view bytes, const char* where, const f
   fs::create_directories(folder, ec);
   if (!fs::exists(file, ec)) EMBERLOCK_RETURN_IF_ERROR(write_file_atomically(file, bytes));
   return file;
+}
+
+void add_projection(v1::StylizationStatus::View& told, const recon::CameraModel& camera) {
+  const recon::Intrinsics& in = camera.intrinsics;
+  Eigen::Matrix3d pixel_from_camera;
+  pixel_from_camera << in.fx, 0, in.cx, 0, in.fy, in.cy, 0, 0, 1;
+  Eigen::Matrix<double, 3, 4, Eigen::RowMajor> camera_from_world;
+  camera_from_world << camera.camera_from_world.rotation, camera.camera_from_world.translation;
+  const Eigen::Matrix<double, 3, 4, Eigen::RowMajor> whole = pixel_from_camera * camera_from_world;
+  told.mutable_pixel_from_world()->Add(whole.data(), whole.data() + whole.size());
 }
 
 }  // namespace
@@ -166,6 +177,7 @@ v1::StylizationStatus StylizeStream::status() const {
     told.set_width(static_cast<std::uint32_t>(view.image->size.width));
     told.set_height(static_cast<std::uint32_t>(view.image->size.height));
     told.set_held_out(view.role == recon::ViewRole::held_out);
+    add_projection(told, view.camera);
   }
   status.set_view(captured_.views[view_].name);
   status.set_passes(static_cast<std::uint32_t>(stylization_.passes()));

@@ -1,12 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <chrono>
-#include <csignal>
+#include "tests/support/reconstruction_child.h"
+
 #include <filesystem>
 #include <fstream>
-#include <memory>
-#include <optional>
 #include <string>
-#include <thread>
 #include <utility>
 #include <vector>
 
@@ -14,14 +11,9 @@
 #include <gmock/gmock.h>
 
 #include "base/unique_fd.h"
-#include "daemon/reconstruction/child.h"
 #include "recon/calibrate/camera_response.h"
 #include "recon/calibrate/rig.h"
-#include "session/child_messages.h"
-#include "session/files.h"
-#include "tests/support/reconstruction_child.h"
 #include "tests/support/recording.h"
-#include "tests/support/wait.h"
 
 namespace emberlock::daemon {
 namespace {

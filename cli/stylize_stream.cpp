@@ -6,7 +6,6 @@
 #include <optional>
 #include <span>
 #include <string>
-#include <string_view>
 #include <utility>
 
 #include <Eigen/Core>
@@ -26,23 +25,25 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr int kWidest = 640;                                     // of a preview, in pixels
-constexpr auto kApart = std::chrono::milliseconds(50);           // previews, but for the first after a step
-constexpr auto kSignOfLife = std::chrono::milliseconds(10'000);  // while nothing is done
+constexpr int kWidestPreview = 640;                            // of a preview, in pixels
+constexpr auto kApart = std::chrono::milliseconds(50);         // previews, but for the first after a step
+constexpr auto kSignOfLife = std::chrono::milliseconds(1000);  // while nothing is done
 
-/// Writes a picture's bytes under a name that is made of them.
-Result<fs::path> keep_picture(std::string_view bytes, const char* where, const fs::path& folder) {
+/// Where a picture's bytes are kept: under a name that is made of them.
+Result<fs::path> file_for(const std::string& bytes, const char* where, const fs::path& folder) {
   EMBERLOCK_ASSIGN_OR_RETURN(const ImageSize size, session::picture_size(bytes, where));
   if (std::max(size.width, size.height) > kMostPixels)
     return Error{ErrorKind::bad_input, fmt::format("has {} x {} pixels", size.width, size.height), where,
                  fmt::format("Give at most {} a side", kMostPixels)};
   const std::uint64_t hash = session::pixel_hash(std::as_bytes(std::span(bytes)));
-  const bool png = bytes.front() == '\x89';
-  const fs::path file = folder / fmt::format("given-{:016x}.{}", hash, png ? "png" : "jpg");
+  return folder / fmt::format("given-{:016x}.{}", hash, bytes.front() == '\x89' ? "png" : "jpg");
+}
+
+Status keep_bytes(const fs::path& file, const std::string& bytes) {
   std::error_code ec;
-  fs::create_directories(folder, ec);
-  if (!fs::exists(file, ec)) EMBERLOCK_RETURN_IF_ERROR(write_file_atomically(file, bytes));
-  return file;
+  if (fs::exists(file, ec)) return {};
+  fs::create_directories(file.parent_path(), ec);
+  return write_file_atomically(file, bytes);
 }
 
 void add_projection(v1::StylizationStatus::View& told, const recon::CameraModel& camera) {
@@ -60,15 +61,19 @@ void add_projection(v1::StylizationStatus::View& told, const recon::CameraModel&
 Result<apply::Operation> operation_of(const v1::EditRequest& request, const fs::path& folder) {
   std::optional<apply::GivenPictures> given;
   if (!request.picture().empty()) {
-    EMBERLOCK_ASSIGN_OR_RETURN(fs::path picture, keep_picture(request.picture(), "picture", folder));
+    EMBERLOCK_ASSIGN_OR_RETURN(fs::path picture, file_for(request.picture(), "picture", folder));
     given = {std::move(picture)};
   }
   if (!request.mask().empty()) {
     if (!given)
       return Error{ErrorKind::bad_input, "comes without a picture", "mask", "Send the picture as well"};
-    EMBERLOCK_ASSIGN_OR_RETURN(given->mask, keep_picture(request.mask(), "mask", folder));
+    EMBERLOCK_ASSIGN_OR_RETURN(given->mask, file_for(request.mask(), "mask", folder));
   }
-  return apply::parse_foreign_operation(request.operation(), "step", given);
+  EMBERLOCK_ASSIGN_OR_RETURN(apply::Operation operation,
+                             apply::parse_foreign_operation(request.operation(), "step", given));
+  if (given) EMBERLOCK_RETURN_IF_ERROR(keep_bytes(given->file, request.picture()));
+  if (given && given->mask) EMBERLOCK_RETURN_IF_ERROR(keep_bytes(*given->mask, request.mask()));
+  return operation;
 }
 
 StylizeStream::StylizeStream(apply::Stylization& stylization, const recon::Scene& captured,
@@ -163,8 +168,8 @@ void StylizeStream::show() {
   iteration.set_input_rmse(now.passes() > 0 ? now.residual() : recon::all_channels(last_.input_rmse));
   const recon::RadianceImage& edited = *stylization_.scene().views[view_].image;
   const apply::EditedVolume shown = stylization_.shown();
-  stream_.stylized(now, iteration, recon::shrunk(edited, recon::preview_size(edited.size, kWidest)),
-                   stylization_.preview(shown, view_, kWidest), shown.volume);
+  stream_.stylized(now, iteration, recon::shrunk(edited, recon::preview_size(edited.size, kWidestPreview)),
+                   stylization_.preview(shown, view_, kWidestPreview), shown.volume);
   stream_.progress(1, pauses() ? std::string("waits for a step") : fmt::format("pass {}", now.passes()));
   due_ = Clock::now() + kApart;
 }

@@ -71,6 +71,7 @@ TEST(StylizeStream, PathsAndWhatIsNoPictureAreRefused) {
         r.set_operation(R"({"op": "object", "view": "a", "position": [0, 0], "file": "/etc/passwd"})");
       }),
       HasSubstr("file: names a file"));
+  EXPECT_TRUE(fs::is_empty(folder)) << "what is refused leaves nothing";
   EXPECT_THAT(refusal([](Request& r) { r.clear_picture(); }), HasSubstr("picture: is missing"));
   EXPECT_THAT(refusal([](Request& r) { r.set_picture("GIF89a"); }), HasSubstr("neither a PNG nor a JPEG"));
   EXPECT_THAT(refusal([](Request& r) { r.set_picture(r.picture().substr(0, 40)); }), HasSubstr("truncated"));

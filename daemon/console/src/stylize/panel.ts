@@ -29,13 +29,13 @@ class Newest {
 
   /** False: a later one was quicker. */
   async show(jpeg: Uint8Array): Promise<boolean> {
-    const order = ++this.asked;
+    const turn = ++this.asked;
     const bitmap = await bitmapOf(jpeg);
-    if (order < this.shown) {
+    if (turn < this.shown) {
       bitmap.close();
       return false;
     }
-    this.shown = order;
+    this.shown = turn;
     paint(this.canvas, bitmap);
     return true;
   }
@@ -56,11 +56,12 @@ export class Stylization implements Bench {
   private readonly tools: Tool[] = [new Brush(this), new ObjectTool(this), new Mask(this), new RegionTool(this), new Curve(this)];
   private readonly hint = el('p', {class: 'note tool-hint', id: 'stylize-hint'});
   private readonly place = el('div', {class: 'tool'});
-  private readonly waiting = new Set<() => void>();
+  private readonly waiting = new Set<(passes: number) => void>();
   private tool = this.tools[0]!;
   private queue: Promise<unknown> = Promise.resolve();
   private id = '';
   private now?: StylizationStatus;
+  private previewed?: StylizationStatus;  // what the pictures that come next show
   box: Box | undefined;
   readonly root: HTMLElement;
 
@@ -107,21 +108,21 @@ export class Stylization implements Bench {
   preview({reconstruction, stylization}: IterationPreview): void {
     if (!stylization) return;
     this.begin(reconstruction);
+    this.previewed = stylization;
     this.take(stylization);
   }
 
   async picture(header: View, jpeg: Uint8Array): Promise<void> {
-    if (!this.now) return;
-    const {steps, view, passes} = this.now;
-    const {canvas} = header.kind === 'captured' ? this.edited : this.rendered;
-    if (!await (header.kind === 'captured' ? this.edited : this.rendered).show(jpeg)) return;
-    set(canvas, 'data-steps', steps);
-    set(canvas, 'data-passes', passes);
-    set(canvas, 'data-view', view);
-    setText(this.captions.captured, `Input picture of ${this.now.view}, as edited`);
-    setText(this.captions.rendered, `The volume, as ${this.now.view} sees it, after ${plural(this.now.passes, 'pass', 'passes')}`);
+    if (!this.previewed) return;
+    const {steps, view, passes} = this.previewed;
+    const picture = header.kind === 'captured' ? this.edited : this.rendered;
+    if (!await picture.show(jpeg)) return;
+    set(picture.canvas, 'data-steps', steps);
+    set(picture.canvas, 'data-view', view);
+    setText(this.captions[header.kind], header.kind === 'captured' ? `Input picture of ${view}, as edited`
+      : `The volume, as ${view} sees it, after ${plural(passes, 'pass', 'passes')}`);
     this.pad.draw();
-    if (header.kind === 'rendered') for (const seen of [...this.waiting]) seen();
+    if (header.kind === 'rendered') for (const tell of [...this.waiting]) tell(passes);
   }
 
   volume({box}: Volume): void {
@@ -141,21 +142,22 @@ export class Stylization implements Bench {
     return step.then(async answer => {
       if (!answer) return false;
       this.take(answer);
-      await this.seen();
+      await this.seenAfter(answer.passes);
       return true;
     });
   }
 
-  /** Until the next preview. */
-  private seen(): Promise<void> {
+  /** Until a preview shows more passes than these. */
+  private seenAfter(before: number): Promise<void> {
     return new Promise(resolve => {
-      const done = (): void => {
-        this.waiting.delete(done);
+      const heard = (passes: number): void => {
+        if (passes <= before) return;
+        this.waiting.delete(heard);
         clearTimeout(timer);
         resolve();
       };
-      const timer = setTimeout(done, kLate);
-      this.waiting.add(done);
+      const timer = setTimeout(() => heard(Infinity), kLate);
+      this.waiting.add(heard);
     });
   }
 
@@ -167,7 +169,7 @@ export class Stylization implements Bench {
   private begin(id: string): void {
     if (id === this.id) return;
     this.id = id;
-    this.now = undefined;
+    this.now = this.previewed = undefined;
   }
 
   private take(status: StylizationStatus): void {

@@ -39,16 +39,20 @@ export class StylizedFlame {
   private edit({operation, view}: Partial<EditRequest>): StylizationStatus {
     if (view) this.status = {...this.status, view};
     if (operation) this.take(JSON.parse(operation) as {op: string});
-    setTimeout(() => this.preview(), 20);
-    return this.status;
+    const answer = this.status;
+    setTimeout(() => {
+      if (operation) this.status = {...this.status, passes: this.status.passes + 1, residual: 3.41};
+      this.preview();
+    }, 20);
+    return answer;
   }
 
   private take(step: {op: string}): void {
     this.steps.push(step);
-    const {steps, undone, passes} = this.status;
+    const {steps, undone} = this.status;
     const change = step.op === 'undo' ? -1 : 1;
     if (steps + change < 0) throw new Refusal(400, 'INVALID_ARGUMENT', 'steps[0]: there is nothing to undo. Leave it away.');
     if ((step as {radius?: number}).radius === 9999) throw new Refusal(400, 'INVALID_ARGUMENT', 'step: view: "virtual-10" is held out. Give one of virtual-00, virtual-01.');
-    this.status = {...this.status, steps: steps + change, undone: step.op === 'undo' ? undone + 1 : step.op === 'redo' ? undone - 1 : 0, passes: passes + 1, residual: 3.41, pauses: false};
+    this.status = {...this.status, steps: steps + change, undone: step.op === 'undo' ? undone + 1 : step.op === 'redo' ? undone - 1 : 0, pauses: false};
   }
 }

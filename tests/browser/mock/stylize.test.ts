@@ -97,7 +97,7 @@ describe('on the picture', () => {
       context.fillStyle = '#fff';
       context.fillRect(160, 120, 320, 240);
     });
-    await page.getByLabel('Picture').setInputFiles({name: 'box.jpg', mimeType: 'image/jpeg', buffer: Buffer.from(jpeg!)});
+    await page.getByLabel('Picture', {exact: true}).setInputFiles({name: 'box.jpg', mimeType: 'image/jpeg', buffer: Buffer.from(jpeg!)});
     await page.waitForSelector('.tool button.primary:not(:disabled)');
     await page.getByLabel('Rotation').fill('30');
     await page.getByLabel('Opacity').fill('0.8');
@@ -129,13 +129,13 @@ describe('on the picture', () => {
       context.fill();
       return canvas.toDataURL().split(',')[1]!;
     });
-    await page.getByLabel('Picture').setInputFiles({name: 'disc.png', mimeType: 'image/png', buffer: Buffer.from(png, 'base64')});
+    await page.getByLabel('Picture', {exact: true}).setInputFiles({name: 'disc.png', mimeType: 'image/png', buffer: Buffer.from(png, 'base64')});
     await page.waitForSelector('.tool button.primary:not(:disabled)');
     await page.getByRole('button', {name: 'Put into this view'}).click();
     await seen(page, 1);
     expect(Buffer.from(String(asked()[0]!.mask), 'base64').subarray(1, 4).toString()).toBe('PNG');
-    await page.getByLabel('Picture').setInputFiles({name: 'a.png', mimeType: 'image/png', buffer: Buffer.from('none')});
-    await until(() => page.getByLabel('Picture').evaluate((input: HTMLInputElement) => input.validationMessage), words => words !== '', 'it says so');
+    await page.getByLabel('Picture', {exact: true}).setInputFiles({name: 'a.png', mimeType: 'image/png', buffer: Buffer.from('none')});
+    await until(() => page.getByLabel('Picture', {exact: true}).evaluate((input: HTMLInputElement) => input.validationMessage), words => words !== '', 'it says so');
   });
 });
 
@@ -178,7 +178,7 @@ describe('what the daemon says', () => {
     await page.getByLabel('Radius').fill('9999');
     await stroke(page, [0.5, 0.5]);
     await page.waitForSelector('.toast');
-    expect(await text(page, '.toast p')).toBe('Step: view: "virtual-10" is held out. Give one of virtual-00, virtual-01.');
+    expect(await text(page, '.toast p')).toBe('step: view: "virtual-10" is held out. Give one of virtual-00, virtual-01.');
     expect(flame.status.steps).toBe(0);
     await screenshot(page, 'stylize-refused');
     await page.getByLabel('Radius').fill('10');
@@ -205,7 +205,7 @@ describe('what the daemon says', () => {
 
   test('another view is asked for; one that is held out can\'t be', async () => {
     const {page} = await stylize();
-    await page.getByLabel('View').selectOption('virtual-04');
+    await page.getByLabel('View', {exact: true}).selectOption('virtual-04');
     await page.waitForSelector('.stylized[data-view="virtual-04"]');
     expect(asked()).toEqual([{view: 'virtual-04'}]);
     expect(await page.locator('#stylization option[value=virtual-10]').isDisabled()).toBe(true);

@@ -140,7 +140,7 @@ test('a ball is put into all views, and what is finished replays', async () => {
     context.fillRect(0, 0, 128, 128);
     return canvas.toDataURL().split(',')[1]!;
   });
-  await page.getByLabel('Picture').setInputFiles({name: 'ball.png', mimeType: 'image/png', buffer: Buffer.from(png, 'base64')});
+  await page.getByLabel('Picture', {exact: true}).setInputFiles({name: 'ball.png', mimeType: 'image/png', buffer: Buffer.from(png, 'base64')});
   await page.waitForSelector('.tool button.primary:not(:disabled)');
   await page.getByLabel('Scale').fill('0.7');
   await page.getByRole('button', {name: 'Put into all 11 views'}).click();

@@ -16,7 +16,7 @@ class Stop {
   constructor(kelvin: number, colour: string, gain: number, changed: () => void, remove: (stop: Stop) => void) {
     this.kelvin = new NumberField('at', kelvin, {min: 1, max: 100000}, 'K', changed);
     this.colour = el('input', {type: 'color', value: colour, 'aria-label': 'Colour of the stop', oninput: changed});
-    this.gain = new NumberField('gain', gain, {min: 0, max: 10000}, '×');
+    this.gain = new NumberField('gain', gain, {min: 0, max: 10000});
     this.root = el('li', {}, this.kelvin.root, this.colour, this.gain.root,
       el('button', {type: 'button', class: 'quiet', 'aria-label': 'Remove the stop', onclick: () => remove(this)}, '✕'));
   }

@@ -12,14 +12,14 @@ export class RegionTool implements Tool {
   readonly name = 'Region';
   readonly hint = 'A part of the volume, by its middle and size; yellow on the picture.';
   private readonly shape = choice('Shape', {ellipsoid: 'ellipsoid', box: 'box'}, () => this.bench.redraw());
-  private readonly center = kAxes.map(axis => new NumberField(axis, 0, {min: -1e6, max: 1e6}, 'mm', () => this.bench.redraw()));
-  private readonly size = kAxes.map(axis => new NumberField(axis, 100, {min: 0.01, max: 1e6}, 'mm', () => this.bench.redraw()));
+  private readonly center = kAxes.map(axis => new NumberField(axis, 0, {min: -1e6, max: 1e6}, '', () => this.bench.redraw()));
+  private readonly size = kAxes.map(axis => new NumberField(axis, 100, {min: 0.01, max: 1e6}, '', () => this.bench.redraw()));
   private readonly edge = new NumberField('Soft edge', 0, {min: 0, max: 1e6}, 'mm');
   private readonly factor = new NumberField('Brightness', 2, {min: 0, max: 10000}, '×');
   private box: unknown;
   readonly root = el('div', {}, this.shape.root,
-    el('fieldset', {class: 'three'}, el('legend', {}, 'Middle'), ...this.center.map(field => field.root)),
-    el('fieldset', {class: 'three'}, el('legend', {}, 'Size'), ...this.size.map(field => field.root)),
+    el('fieldset', {class: 'three'}, el('legend', {}, 'Middle, mm'), ...this.center.map(field => field.root)),
+    el('fieldset', {class: 'three'}, el('legend', {}, 'Size, mm'), ...this.size.map(field => field.root)),
     this.factor.root, this.edge.root, el('div', {class: 'tool-orders'}, order('Set brightness', () => this.apply('brightness'), 'primary')),
     el('div', {class: 'tool-orders'}, order('Keep only this', () => this.apply('keep')), order('Cut this out', () => this.apply('cut'))));
 

@@ -156,6 +156,7 @@ Status keep_objects(apply::EditFile& edits, const fs::path& folder) {
   // Those of steps that were refused.
   for (const fs::directory_entry& entry : fs::directory_iterator(folder / kObjects, ec))
     if (!kept.contains(entry.path())) fs::remove(entry.path(), ec);
+  if (kept.empty()) fs::remove(folder / kObjects, ec);
   return {};
 }
 
@@ -236,14 +237,15 @@ Result<recon::Report> write(const StylizeArguments& a, const recon::Scene& captu
 Status edit(const StylizeArguments& a, const apply::EditFile& edits, const recon::Scene& scene,
             const recon::Report& from, apply::Stylization& stylization, const fs::path& folder,
             ProgressStream* stream) {
+  std::error_code ec;
   if (stream != nullptr) {
+    fs::create_directories(folder / kObjects, ec);
     const recon::TracePoint last = from.trace.empty() ? recon::TracePoint() : from.trace.back();
     return StylizeStream(stylization, scene, last, a.passes.value_or(kPassesAfterAnEdit), folder / kObjects,
                          *stream)
         .run(STDIN_FILENO);
   }
   EMBERLOCK_ASSIGN_OR_RETURN(const std::size_t view, view_shown(a, edits, scene));
-  std::error_code ec;
   if (a.previews) fs::create_directory(folder / "previews", ec);
   return StylizeRun(a, edits, stylization, folder, view).go();
 }

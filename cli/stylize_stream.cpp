@@ -41,9 +41,7 @@ Result<fs::path> file_for(const std::string& bytes, const char* where, const fs:
 
 Status keep_bytes(const fs::path& file, const std::string& bytes) {
   std::error_code ec;
-  if (fs::exists(file, ec)) return {};
-  fs::create_directories(file.parent_path(), ec);
-  return write_file_atomically(file, bytes);
+  return fs::exists(file, ec) ? Status() : write_file_atomically(file, bytes);
 }
 
 void add_projection(v1::StylizationStatus::View& told, const recon::CameraModel& camera) {

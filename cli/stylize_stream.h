@@ -15,8 +15,9 @@
 namespace emberlock::cli {
 
 /// What is to be done by who may name no files (v1::EditRequest): its operation. The pictures that came with
-/// an object are put into `folder`, named after their bytes. Errors: those of parse_foreign_operation();
-/// pictures that are neither PNG nor JPEG, damaged, or of more than kMostPixels a side.
+/// an object are put into `folder`, which is there, named after their bytes. Errors: those of
+/// parse_foreign_operation(); pictures that are neither PNG nor JPEG, damaged, or of more than kMostPixels a
+/// side.
 Result<apply::Operation> operation_of(const v1::EditRequest& request, const std::filesystem::path& folder);
 inline constexpr int kMostPixels = 4096;
 

@@ -117,16 +117,6 @@ Result<std::vector<std::uint64_t>> ReconstructionChild::frames_of(
   return session::frames_of(range, recorded, "last_frame");
 }
 
-fs::path ReconstructionChild::result_of(const v1::ReconstructRequest& request) const {
-  const std::string frame = request.has_frame() ? fmt::format("frame-{}", request.frame()) : "middle-frame";
-  const fs::path folder = fs::absolute(options_.results / request.session());
-  if (!request.stylize()) return folder / frame;
-  std::error_code ec;
-  fs::path result = folder / (frame + "-stylized");
-  for (int n = 2; fs::exists(result, ec); ++n) result = folder / fmt::format("{}-stylized-{}", frame, n);
-  return result;
-}
-
 std::vector<std::string> ReconstructionChild::command_for(const v1::ReconstructRequest& request) const {
   const v1::ReconstructRequest& unasked = options_.unasked;
   const std::string& device = !request.device().empty() ? request.device() : unasked.device();
@@ -153,6 +143,16 @@ std::vector<std::string> ReconstructionChild::command_for(const v1::ReconstructR
   if (request.errors()) command.emplace_back("--errors");
   if (options_.threads > 0) option("--threads", std::to_string(options_.threads));
   return command;
+}
+
+fs::path ReconstructionChild::result_of(const v1::ReconstructRequest& request) const {
+  const std::string frame = request.has_frame() ? fmt::format("frame-{}", request.frame()) : "middle-frame";
+  const fs::path folder = fs::absolute(options_.results / request.session());
+  if (!request.stylize()) return folder / frame;
+  std::error_code ec;
+  fs::path result = folder / (frame + "-stylized");
+  for (int n = 2; fs::exists(result, ec); ++n) result = folder / fmt::format("{}-stylized-{}", frame, n);
+  return result;
 }
 
 Result<v1::ReconstructionStatus> ReconstructionChild::start(const v1::ReconstructRequest& request) {

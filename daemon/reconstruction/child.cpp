@@ -92,6 +92,16 @@ ReadEnd read_all(int fd, const TakeBytes& take) {
 
 }  // namespace
 
+fs::path ReconstructionChild::result_of(const v1::ReconstructRequest& request) const {
+  const std::string frame = request.has_frame() ? fmt::format("frame-{}", request.frame()) : "middle-frame";
+  const fs::path folder = fs::absolute(options_.results / request.session());
+  if (!request.stylize()) return folder / frame;
+  std::error_code ec;
+  fs::path result = folder / (frame + "-stylized");
+  for (int n = 2; fs::exists(result, ec); ++n) result = folder / fmt::format("{}-stylized-{}", frame, n);
+  return result;
+}
+
 Status ReconstructionChild::check(const v1::ReconstructRequest& request) const {
   EMBERLOCK_RETURN_IF_ERROR(check_request(request));
   const auto frames = frames_of(request);
@@ -143,16 +153,6 @@ std::vector<std::string> ReconstructionChild::command_for(const v1::ReconstructR
   if (request.errors()) command.emplace_back("--errors");
   if (options_.threads > 0) option("--threads", std::to_string(options_.threads));
   return command;
-}
-
-fs::path ReconstructionChild::result_of(const v1::ReconstructRequest& request) const {
-  const std::string frame = request.has_frame() ? fmt::format("frame-{}", request.frame()) : "middle-frame";
-  const fs::path folder = fs::absolute(options_.results / request.session());
-  if (!request.stylize()) return folder / frame;
-  std::error_code ec;
-  fs::path result = folder / (frame + "-stylized");
-  for (int n = 2; fs::exists(result, ec); ++n) result = folder / fmt::format("{}-stylized-{}", frame, n);
-  return result;
 }
 
 Result<v1::ReconstructionStatus> ReconstructionChild::start(const v1::ReconstructRequest& request) {

@@ -334,6 +334,12 @@ Result<v1::ReconstructionStatus> Engine::cancel_reconstruction() {
                                                      });
 }
 
+Result<v1::StylizationStatus> Engine::edit_reconstruction(const v1::EditRequest& request) {
+  return reconstruction_.edit(request);
+}
+
+Result<v1::ReconstructionStatus> Engine::finish_reconstruction() { return reconstruction_.finish(); }
+
 std::shared_ptr<const v1::IterationPreview> Engine::reconstructed_frame(const v1::FrameRequest& request) {
   return reconstruction_.frame(request);
 }

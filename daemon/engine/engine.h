@@ -67,6 +67,8 @@ class Engine final : public Api {
   Status cancel_job(const v1::CancelJobRequest& request) override;
   Result<v1::ReconstructionStatus> reconstruct(const v1::ReconstructRequest& request) override;
   Result<v1::ReconstructionStatus> cancel_reconstruction() override;
+  Result<v1::StylizationStatus> edit_reconstruction(const v1::EditRequest& request) override;
+  Result<v1::ReconstructionStatus> finish_reconstruction() override;
   std::shared_ptr<const v1::IterationPreview> reconstructed_frame(const v1::FrameRequest& request) override;
 
  private:

@@ -89,13 +89,18 @@ class SpawnSettings {
 Result<ChildProcess> ChildProcess::spawn(const std::vector<std::string>& command, int niceness,
                                          std::string_view input) {
   EMBERLOCK_ASSIGN_OR_RETURN(const UniqueFd held, make_input(input, command[0]));
+  return spawn(command, niceness, held);
+}
+
+Result<ChildProcess> ChildProcess::spawn(const std::vector<std::string>& command, int niceness,
+                                         const UniqueFd& input) {
   EMBERLOCK_ASSIGN_OR_RETURN(Pipe messages, make_pipe(command[0]));
   EMBERLOCK_ASSIGN_OR_RETURN(Pipe errors, make_pipe(command[0]));
   std::vector<char*> words;
   words.reserve(command.size() + 1);
   for (const std::string& word : command) words.push_back(const_cast<char*>(word.c_str()));
   words.push_back(nullptr);
-  const SpawnSettings settings(held, messages, errors);
+  const SpawnSettings settings(input, messages, errors);
   pid_t pid = -1;
   const int code =
       ::posix_spawnp(&pid, words[0], &settings.actions, &settings.attributes, words.data(), environ);

@@ -28,6 +28,9 @@ class ChildProcess {
   /// `input`, from a file in memory, on its stdin. Errors name the program.
   static Result<ChildProcess> spawn(const std::vector<std::string>& command, int niceness,
                                     std::string_view input = {});
+  /// The same with `input` itself as its stdin.
+  static Result<ChildProcess> spawn(const std::vector<std::string>& command, int niceness,
+                                    const UniqueFd& input);
   ChildProcess(ChildProcess&& other) noexcept
       : pid_(std::exchange(other.pid_, -1)),
         exited_(std::move(other.exited_)),

@@ -240,6 +240,15 @@ class ReconstructService final : public v1::Reconstruct::CallbackService {
                                    v1::ReconstructionStatus* response) override {
     return answer(backend_, context, response, [this] { return backend_.api.cancel_reconstruction(); });
   }
+  grpc::ServerUnaryReactor* Edit(Context* context, const v1::EditRequest* request,
+                                 v1::StylizationStatus* response) override {
+    return answer(backend_, context, response,
+                  [this, request] { return backend_.api.edit_reconstruction(*request); });
+  }
+  grpc::ServerUnaryReactor* Finish(Context* context, const v1::Empty* /*request*/,
+                                   v1::ReconstructionStatus* response) override {
+    return answer(backend_, context, response, [this] { return backend_.api.finish_reconstruction(); });
+  }
   grpc::ServerUnaryReactor* Frame(Context* context, const v1::FrameRequest* request,
                                   v1::IterationPreview* response) override {
     return answer(backend_, context, response,

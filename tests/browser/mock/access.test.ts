@@ -10,7 +10,9 @@ import type {AlignmentStatus} from '../../../daemon/console/src/api.gen';
 import {bench, drawn, kPhone, kSizes} from './bench';
 import {faultyAligning, faultyCapturing, noLamp} from './faulty';
 import {Refusal} from './mock';
+import {flamePictures} from './pictures';
 import {alignment, capturing, idle, locked, reconstruction, sequence} from './scene';
+import {StylizedFlame} from './stylize_scene';
 import {until} from '../support/chromium';
 
 const kAxe = readFileSync(fileURLToPath(new URL('../../../daemon/console/node_modules/axe-core/axe.min.js', import.meta.url)), 'utf8');
@@ -64,6 +66,17 @@ describe.each([kSizes[0], kPhone])('axe at $width x $height', size => {
     await page.keyboard.press('?');
     await page.waitForSelector('.help[open]');
     expect(await findings(page), 'keys').toEqual([]);
+  });
+
+  test('finds nothing in a stylization, whichever tool is at hand', async () => {
+    const flame = new StylizedFlame(rig.mock, await flamePictures(rig.browser, 2));
+    const page = await rig.open(size);
+    flame.preview();
+    await page.waitForSelector('#stylization .stylized[data-view="virtual-00"]');
+    for (const name of ['Brush', 'Object', 'Mask', 'Region', 'Colour']) {
+      await page.locator('.tool-choice label', {hasText: name}).click();
+      expect(await findings(page), name).toEqual([]);
+    }
   });
 });
 

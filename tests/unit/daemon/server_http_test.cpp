@@ -263,6 +263,23 @@ TEST_F(ServerHttpTest, AJobThatFailsOnItsWayEndsItsStreamWithTheError) {
   }
 }
 
+TEST_F(ServerHttpTest, AStepOfAStylizationComesWithItsPictureInBase64) {
+  api.on_edit_reconstruction = [](const v1::EditRequest& request) -> Result<v1::StylizationStatus> {
+    if (request.picture() != "voxels") return Error{ErrorKind::bad_input, "is missing", "step: picture"};
+    v1::StylizationStatus status;
+    status.set_steps(1);
+    return status;
+  };
+  serve();
+  const std::string path = "/api/v1/Reconstruct/Edit";
+  const auto taken = ask(port, "POST", path, R"({"operation": "{}", "picture": "dm94ZWxz"})");
+  EXPECT_EQ(json::parse(taken.body)["steps"], 1);
+  const auto refused = ask(port, "POST", path, R"({"operation": "{}"})");
+  EXPECT_EQ(refused.status, 400);
+  EXPECT_EQ(json::parse(refused.body)["message"], "step: picture: is missing");
+  EXPECT_EQ(ask(port, "POST", "/api/v1/Reconstruct/Finish", "{}").status, 200);
+}
+
 TEST_F(ServerHttpTest, AFrameThatIsNotHeldIsNotFound) {
   api.on_reconstructed_frame = [](const v1::FrameRequest& request) {
     if (request.frame() != 12) return std::shared_ptr<const v1::IterationPreview>();

@@ -36,7 +36,7 @@ Result<std::optional<Prefix>> read_prefix(std::string_view bytes) {
 
 }  // namespace
 
-std::string framed(const v1::ChildMessage& message) {
+std::string framed(const google::protobuf::MessageLite& message) {
   std::ostringstream out;
   google::protobuf::util::SerializeDelimitedToOstream(message, &out);
   return std::move(out).str();

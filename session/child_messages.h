@@ -16,7 +16,7 @@ namespace emberlock::session {
 inline constexpr std::size_t kLargestChildMessage = std::size_t{4} << 20;
 
 /// The message, preceded by its length as a varint.
-std::string framed(const v1::ChildMessage& message);
+std::string framed(const google::protobuf::MessageLite& message);
 
 /// Splits the bytes of a pipe into messages. The bytes may arrive in pieces of any size.
 class ChildMessageParser {

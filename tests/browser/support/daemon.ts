@@ -29,6 +29,11 @@ export class Daemon {
   private bin = '';
   url = '';
 
+  /** Where it keeps what it records, and beside that what it reconstructs. */
+  get data(): string {
+    return this.folder;
+  }
+
   /** `rig` is the configuration's part that tells of cameras and strobe. */
   async start(bin: string, console: string, rig: string): Promise<void> {
     const port = await freePort();

@@ -33,8 +33,8 @@ class LiveFlame {
 
   struct Seen {
     TrackedPose pose;
-    int without = 0;               ///< frames since the marker was seen
-    std::string instead = {};      ///< while it isn't: other_markers(), as it was looked for last
+    int without = 0;           ///< frames since the marker was seen
+    std::string instead = {};  ///< while it isn't: other_markers(), as it was looked for last
   };
   /// Draws into the next frame, rgb8, later than the one before. Errors: those of FlamePlayer::at().
   Result<Seen> draw(Seconds time, Image& frame, recon::Pool& pool);

@@ -38,7 +38,7 @@ class ArInputs {
   }
 
  private:
-  google::protobuf::io::FileInputStream stream_{STDIN_FILENO};
+  google::protobuf::io::FileInputStream stream_{STDIN_FILENO, 1 << 18};
 };
 
 Error unexpected(std::string what) {

@@ -49,7 +49,8 @@ void add_rows(std::string& svg, const ImageView& picture, int from, int to) {
 std::string svg_of(const Print& print) {
   const ImageView picture = print.picture.view();
   std::string svg = fmt::format(
-      "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{0:.3f}mm\" height=\"{1:.3f}mm\" viewBox=\"0 0 {2} {3}\" "
+      "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{0:.3f}mm\" height=\"{1:.3f}mm\" viewBox=\"0 0 {2} "
+      "{3}\" "
       "shape-rendering=\"crispEdges\">\n<rect width=\"{2}\" height=\"{3}\" fill=\"#fff\"/>\n",
       picture.width() * print.pixel, picture.height() * print.pixel, picture.width(), picture.height());
   const auto equal = [&](int a, int b) {
@@ -79,7 +80,8 @@ void add_marker(CLI::App& app) {
   };
   auto arguments = std::make_shared<Arguments>();
   CLI::App* verb = app.add_subcommand("marker", "Draws a marker or a board for printing, in its size");
-  verb->add_option("MARKER", arguments->marker, "As `emberlock ar --marker`: aruco:4X4_50:0:80mm")->required();
+  verb->add_option("MARKER", arguments->marker, "As `emberlock ar --marker`: aruco:4X4_50:0:80mm")
+      ->required();
   verb->add_option("--out", arguments->out, "An SVG file; one that is there is replaced")->required();
   verb->callback([arguments] { or_fail(print_marker(arguments->marker, arguments->out)); });
 }

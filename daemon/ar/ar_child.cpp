@@ -17,9 +17,7 @@ namespace {
 
 constexpr const char* kProgram = "the program that draws the flame";
 
-Error broken(std::string what) {
-  return {ErrorKind::device, std::move(what), kProgram, "Start it again"};
-}
+Error broken(std::string what) { return {ErrorKind::device, std::move(what), kProgram, "Start it again"}; }
 
 /// Sends what goes now. False: nobody reads any more.
 bool send_some(int fd, std::string_view& bytes) {
@@ -39,7 +37,8 @@ Result<ArChild> ArChild::start(const std::vector<std::string>& command, int nice
 Status ArChild::read_answer(std::optional<v1::ChildMessage>& answer) {
   Status parsed;
   read_all(process_.messages(), [&](std::string_view bytes) {
-    if (parsed.ok()) parsed = parser_.add(bytes, [&](v1::ChildMessage&& message) { answer = std::move(message); });
+    if (parsed.ok())
+      parsed = parser_.add(bytes, [&](v1::ChildMessage&& message) { answer = std::move(message); });
   });
   if (!parsed.ok()) return broken("sent what can't be understood, " + parsed.error().what);
   if (answer && answer->has_failure()) return Error{ErrorKind::bad_input, answer->failure().message()};

@@ -28,7 +28,8 @@ Error bad_field(const char* field, std::string what, std::string remedy) {
 /// 0 stands for a default.
 Status check_number(const char* field, double value, double least, double most) {
   if (value == 0 || (std::isfinite(value) && value >= least && value <= most)) return {};
-  return bad_field(field, "is out of range", fmt::format("Give {:g} to {:g}, or 0 for the default", least, most));
+  return bad_field(field, "is out of range",
+                   fmt::format("Give {:g} to {:g}, or 0 for the default", least, most));
 }
 
 /// With the defaults filled in.
@@ -184,9 +185,9 @@ void LiveAr::run(const v1::ArInput& scene, const ArCamera& camera) {
     if (ends()) return set_state(v1::ArStatus::STOPPED);
     set_state(v1::ArStatus::FAILED, error.message());
   };
-  auto child = ArChild::start({options_.program.string(), "ar-live", "--progress-fd",
-                               std::to_string(ChildProcess::kMessagesFd)},
-                              options_.niceness);
+  auto child = ArChild::start(
+      {options_.program.string(), "ar-live", "--progress-fd", std::to_string(ChildProcess::kMessagesFd)},
+      options_.niceness);
   if (!child.ok()) return fail(child.error());
   const auto loaded = child->ask(scene, options_.patience, [this] { return ends(); });
   if (!loaded.ok()) return fail(loaded.error());
@@ -195,7 +196,8 @@ void LiveAr::run(const v1::ArInput& scene, const ArCamera& camera) {
                        static_cast<int>(scene.scene().frame_height())};
   const Status drawn = draw(*child, camera, size);
   if (drawn.ok() || ends()) return set_state(v1::ArStatus::STOPPED);
-  board_.notice(v1::AMBER, "The flame in the live pictures of " + camera.id + " ended: " + drawn.error().message());
+  board_.notice(v1::AMBER,
+                "The flame in the live pictures of " + camera.id + " ended: " + drawn.error().message());
   fail(drawn.error());
 }
 
@@ -226,7 +228,8 @@ Status LiveAr::draw(ArChild& child, const ArCamera& camera, ImageSize size) {
     EMBERLOCK_ASSIGN_OR_RETURN(v1::ChildMessage answer,
                                child.ask(input, options_.patience, [this] { return ends(); }));
     if (!answer.has_ar_picture())
-      return Error{ErrorKind::device, "answered a frame with something else", "the program that draws the flame"};
+      return Error{ErrorKind::device, "answered a frame with something else",
+                   "the program that draws the flame"};
     show(*frame, size, std::move(*answer.mutable_ar_picture()));
   }
   return {};

@@ -46,8 +46,11 @@ inline void record_marker(const std::filesystem::path& folder, const MarkerSessi
     look.seed = static_cast<std::uint64_t>(f);
     const auto ns = static_cast<std::int64_t>(f * 1e9 / session.rate);
     Frame frame;
-    frame.stamp = {static_cast<std::uint64_t>(f), {ns + 5}, {1'700'000'000'000'000'000 + ns},
-                   {1'000'000'000 + ns}, FrameStatus::complete};
+    frame.stamp = {static_cast<std::uint64_t>(f),
+                   {ns + 5},
+                   {1'700'000'000'000'000'000 + ns},
+                   {1'000'000'000 + ns},
+                   FrameStatus::complete};
     frame.image = std::make_shared<const Image>(plate.seen_by(session.camera(f), look));
     check(writer->write(0, frame));
   }
@@ -61,7 +64,8 @@ inline void put_flame(const std::filesystem::path& folder, int voxels, Seconds t
   const recon::Grid grid =
       recon::grid_over({Eigen::Vector3d::Zero(), Eigen::Vector3d::Constant(0.2)}, voxels);
   std::filesystem::create_directories(folder);
-  const Status written = recon::write_volume(recon::Flame(options).at(time, grid).volume, folder / "volume.vdb");
+  const Status written =
+      recon::write_volume(recon::Flame(options).at(time, grid).volume, folder / "volume.vdb");
   if (!written.ok()) throw std::runtime_error(written.error().message());
 }
 

@@ -78,6 +78,7 @@ export class Enlarged {
       this.changed();
     });
     this.root.addEventListener('keydown', event => {
+      if ((event.target as HTMLElement).closest('input, select')) return;  // they have arrow keys of their own
       if (event.key === 'ArrowLeft') this.turn(-1);
       if (event.key === 'ArrowRight') this.turn(1);
     });

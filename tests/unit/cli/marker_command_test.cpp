@@ -25,7 +25,8 @@ class MarkerCommandTest : public testing::Test {
     const std::string svg = test::bytes_of(temp_ / "marker.svg");
     std::smatch found;
     EXPECT_TRUE(std::regex_search(svg, found, std::regex("viewBox=\"0 0 (\\d+) (\\d+)\"")));
-    Image image(ImageLayout{{scale * std::stoi(found[1]), scale * std::stoi(found[2])}, PixelFormat::gray8, 8});
+    Image image(
+        ImageLayout{{scale * std::stoi(found[1]), scale * std::stoi(found[2])}, PixelFormat::gray8, 8});
     std::fill(image.bytes().begin(), image.bytes().end(), std::byte{255});
     const std::regex path("M(\\d+) (\\d+)H(\\d+)V(\\d+)H");
     for (auto at = std::sregex_iterator(svg.begin(), svg.end(), path); at != std::sregex_iterator(); ++at)
@@ -53,8 +54,9 @@ TEST_F(MarkerCommandTest, ABoardIsWhatArFinds) {
   const Image image = drawn(1);
   const auto board = apply::parse_marker(words).value();
   const ImageSize size = image.layout().size;
-  EXPECT_FALSE(apply::find_marker(image.view(), board, {size, 900, 900, size.width / 2.0, size.height / 2.0, {}})
-                   .empty());
+  EXPECT_FALSE(
+      apply::find_marker(image.view(), board, {size, 900, 900, size.width / 2.0, size.height / 2.0, {}})
+          .empty());
 }
 
 TEST_F(MarkerCommandTest, WhatIsNoMarkerIsRefused) {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Real videos that change their size: H.264 of two sizes, joined by ffmpeg (package ffmpeg, which scripts/setup
-// installs) without coding it again, and by cat.
+// Real videos that change their size: H.264 of two sizes, joined by ffmpeg (package ffmpeg, which
+// scripts/setup installs) without coding it again, and by cat.
 #include <filesystem>
 #include <string>
 
@@ -35,13 +35,15 @@ class SizeChangeTest : public testing::TestWithParam<const char*> {
     test::put_bytes(temp_ / "cat.ts", test::bytes_of(temp_ / "wide.ts") + test::bytes_of(temp_ / "small.ts"));
   }
   [[nodiscard]] test::VerbRun ar(const std::string& film) const {
-    const recon::Volume volume = test::volume_of(
-        {{-0.1F, -0.1F, 0.1F}, 0.02F, 11, 11, 11},
-        [](int i, int, int) { return std::array<float, 4>{i == 5 ? 100.0F : 0, 0, 0, 0}; });
+    const recon::Volume volume =
+        test::volume_of({{-0.1F, -0.1F, 0.1F}, 0.02F, 11, 11, 11}, [](int i, int, int) {
+          return std::array<float, 4>{i == 5 ? 100.0F : 0, 0, 0, 0};
+        });
     fs::create_directories(temp_ / "fire");
     EXPECT_TRUE(recon::write_volume(volume, temp_ / "fire/volume.vdb").ok());
-    return test::run_verb(add_ar, {"ar", (temp_ / film).string(), (temp_ / "fire").string(), "--out",
-                                   (temp_ / "out").string(), "--marker", "aruco:4X4_50:7:80mm", "--focal", "200"});
+    return test::run_verb(
+        add_ar, {"ar", (temp_ / film).string(), (temp_ / "fire").string(), "--out", (temp_ / "out").string(),
+                 "--marker", "aruco:4X4_50:7:80mm", "--focal", "200"});
   }
   void expect_nothing_written() const {
     for (const auto& entry : fs::directory_iterator(temp_.path()))
@@ -79,8 +81,9 @@ INSTANTIATE_TEST_SUITE_P(Containers, SizeChangeTest, testing::Values("mkv", "mp4
 TEST_F(SizeChangeJoined, StreamsJoinedByCatAreNoTruncatedFile) {
   const auto refused = ar("cat.ts");
   EXPECT_EQ(refused.exit_code, 2);
-  EXPECT_THAT(refused.err,
-              HasSubstr("cat.ts, frame 10: the video is damaged: data are missing, or another recording begins"));
+  EXPECT_THAT(
+      refused.err,
+      HasSubstr("cat.ts, frame 10: the video is damaged: data are missing, or another recording begins"));
   expect_nothing_written();
 }
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The daemon's side of a flame in live pictures; tests/integration/daemon/live_ar_test.cpp has the program that
-// draws.
+// The daemon's side of a flame in live pictures; tests/integration/daemon/live_ar_test.cpp has the program
+// that draws.
 #include "daemon/ar/live_ar.h"
 
 #include <fstream>
@@ -43,7 +43,8 @@ class LiveArTest : public testing::Test {
   }
   /// With ROOT for the folder; what put() wrote is sent by `cat ROOT/NAME >&3`.
   LiveAr& with_script(const std::string& script) {
-    std::ofstream(root_ / "program") << "#!/bin/sh\nROOT='" << root_.path().string() << "'\n" << script << "\n";
+    std::ofstream(root_ / "program") << "#!/bin/sh\nROOT='" << root_.path().string() << "'\n"
+                                     << script << "\n";
     fs::permissions(root_ / "program", fs::perms::owner_all);
     return *(ar_ = std::make_unique<LiveAr>(options_, board_));
   }

@@ -56,19 +56,19 @@ TEST_F(ResultsTest, WhatIsListedIsFoundAndNothingElse) {
   fs::create_directory_symlink(temp_ / "candle", temp_ / "linked");
   EXPECT_EQ(find("candle", "frame-9").value(), temp_ / "candle/frame-9");
   EXPECT_EQ(find("candle", "").value(), temp_ / "candle");
-  for (const auto& [session, result] : std::initializer_list<std::pair<const char*, const char*>>{
-           {"candle", "frame-5"},
-           {"candle", "middle-frame"},
-           {"candle", "elsewhere"},
-           {"candle", "frame-09"},
-           {"candle", "../elsewhere"},
-           {"candle", "frame-9/../../elsewhere"},
-           {"candle/..", "frame-9"},
-           {"..", ""},
-           {"", ""},
-           {"/", "etc"},
-           {"linked", "frame-9"},
-           {"other", "frame-9"}})
+  for (const auto& [session, result] :
+       std::initializer_list<std::pair<const char*, const char*>>{{"candle", "frame-5"},
+                                                                  {"candle", "middle-frame"},
+                                                                  {"candle", "elsewhere"},
+                                                                  {"candle", "frame-09"},
+                                                                  {"candle", "../elsewhere"},
+                                                                  {"candle", "frame-9/../../elsewhere"},
+                                                                  {"candle/..", "frame-9"},
+                                                                  {"..", ""},
+                                                                  {"", ""},
+                                                                  {"/", "etc"},
+                                                                  {"linked", "frame-9"},
+                                                                  {"other", "frame-9"}})
     EXPECT_EQ(find(session, result).error().kind, ErrorKind::bad_input) << session << " " << result;
 }
 

@@ -25,6 +25,11 @@ Error bad_field(const char* field, std::string what, std::string remedy) {
   return {ErrorKind::bad_input, std::move(what), field, std::move(remedy)};
 }
 
+Error unexpected_answer() {
+  return {ErrorKind::device, "answered with something else than was asked for",
+          "the program that draws the flame", "Install emberlock and emberlockd of one version"};
+}
+
 /// 0 stands for a default.
 Status check_number(const char* field, double value, double least, double most) {
   if (value == 0 || (std::isfinite(value) && value >= least && value <= most)) return {};
@@ -191,6 +196,7 @@ void LiveAr::run(const v1::ArInput& scene, const ArCamera& camera) {
   if (!child.ok()) return fail(child.error());
   const auto loaded = child->ask(scene, options_.patience, [this] { return ends(); });
   if (!loaded.ok()) return fail(loaded.error());
+  if (!loaded->has_progress()) return fail(unexpected_answer());
   set_state(v1::ArStatus::SHOWN);
   const ImageSize size{static_cast<int>(scene.scene().frame_width()),
                        static_cast<int>(scene.scene().frame_height())};
@@ -227,9 +233,7 @@ Status LiveAr::draw(ArChild& child, const ArCamera& camera, ImageSize size) {
     input.mutable_frame()->set_rgb(small.bytes().data(), small.bytes().size());
     EMBERLOCK_ASSIGN_OR_RETURN(v1::ChildMessage answer,
                                child.ask(input, options_.patience, [this] { return ends(); }));
-    if (!answer.has_ar_picture())
-      return Error{ErrorKind::device, "answered a frame with something else",
-                   "the program that draws the flame"};
+    if (!answer.has_ar_picture()) return unexpected_answer();
     show(*frame, size, std::move(*answer.mutable_ar_picture()));
   }
   return {};

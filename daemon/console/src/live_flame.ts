@@ -33,7 +33,10 @@ function input(value: string, least: number, most: number, more: Record<string, 
   return el('input', {type: 'number', value, min: least, max: most, step: 'any', required: true, inputmode: 'decimal', ...more});
 }
 
-const labelled = (words: string, control: HTMLElement, unit = '') => el('label', {}, el('span', {}, words), control, el('span', {class: 'unit', 'aria-hidden': 'true'}, unit));
+function labelled(words: string, control: HTMLElement, unit = ''): HTMLElement {
+  set(control, 'aria-label', unit === '' ? words : `${words}, ${unit === '×' ? 'times' : unit}`);
+  return el('label', {}, el('span', {}, words), control, el('span', {class: 'unit', 'aria-hidden': 'true'}, unit));
+}
 
 export class LiveFlame {
   private readonly result = el('select', {required: true});

@@ -91,7 +91,7 @@ describe('told', () => {
       [{pose: 'LOST', without: 40}, 'RED', /Marker lost: no flame is shown\s+for 40 frames/],
       [{pose: 'LOST', without: 40, seen_instead: 'a marker of 5X5_50, number 3'}, 'RED', /instead there is a marker of 5X5_50, number 3/],
       [{pose: 'POSE_UNSPECIFIED', rate_hz: 0}, 'LIGHT_UNSPECIFIED', /Waits for a picture/],
-      [{state: 'FAILED', error: 'left: its pictures have changed their size. Start the flame again'}, 'RED', /The flame ended\s+Left: its pictures have changed their size/],
+      [{state: 'FAILED', error: 'left: its pictures have changed their size. Start the flame again'}, 'RED', /The flame ended\s+left: its pictures have changed their size/],
     ];
     for (const [change, light, words] of cases) {
       rig.mock.show({ar: ar(change)});

@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <memory>
 #include <stdexcept>
+#include <vector>
 
 #include "recon/calibrate/rig.h"
 #include "recon/export/volume_file.h"
@@ -22,9 +23,16 @@ struct MarkerSession {
   int frames = 0;
   double rate = 30;
   PlateLook look = {};
+  int drawn = 0;  ///< so many pictures are drawn, then they come back again and again; 0: all
 
+  /// The picture that a frame has.
+  [[nodiscard]] int picture(int frame) const {
+    if (drawn < 2) return frame;
+    const int at = frame % (2 * drawn - 2);
+    return at < drawn ? at : 2 * drawn - 2 - at;
+  }
   /// Of a frame: a hand holds the camera "hand".
-  [[nodiscard]] recon::CameraModel camera(int frame) const { return in_a_hand(lens, frame / rate); }
+  [[nodiscard]] recon::CameraModel camera(int frame) const { return in_a_hand(lens, picture(frame) / rate); }
 };
 
 /// Throws with the message where something fails.
@@ -37,13 +45,16 @@ inline void record_marker(const std::filesystem::path& folder, const MarkerSessi
   manifest.mutable_cameras(0)->set_camera_id("hand");
   manifest.mutable_cameras(0)->set_frame_rate_hz(session.rate);
   *manifest.mutable_cameras(0)->mutable_calibration() = recon::calibration_of(session.camera(0));
-  auto writer = emberlock::session::SessionWriter::create(
-      folder, manifest, small_disk_options(emberlock::session::Encoding::raw_nut));
+  auto writer = emberlock::session::SessionWriter::create(folder, manifest, small_disk_options());
   check(writer);
   const Plate plate(usual_marker());
+  std::vector<std::shared_ptr<const Image>> pictures;
   for (int f = 0; f < session.frames; ++f) {
     PlateLook look = session.look;
     look.seed = static_cast<std::uint64_t>(f);
+    const auto picture = static_cast<std::size_t>(session.picture(f));
+    if (picture == pictures.size())
+      pictures.push_back(std::make_shared<const Image>(plate.seen_by(session.camera(f), look)));
     const auto ns = static_cast<std::int64_t>(f * 1e9 / session.rate);
     Frame frame;
     frame.stamp = {static_cast<std::uint64_t>(f),
@@ -51,7 +62,7 @@ inline void record_marker(const std::filesystem::path& folder, const MarkerSessi
                    {1'700'000'000'000'000'000 + ns},
                    {1'000'000'000 + ns},
                    FrameStatus::complete};
-    frame.image = std::make_shared<const Image>(plate.seen_by(session.camera(f), look));
+    frame.image = pictures[picture];
     check(writer->write(0, frame));
   }
   check(writer->finish());

@@ -16,7 +16,7 @@ import {number} from '../support/shown';
 const kBuild = fileURLToPath(new URL('../../../build/release', import.meta.url));
 const kConsole = process.env.EMBERLOCK_CONSOLE ?? `${kBuild}/console`;
 const kBin = process.env.EMBERLOCK_BIN ?? `${kBuild}/bin`;
-const kSeconds = 90;  // of the recording
+const kSeconds = 60;  // of the recording
 
 const daemon = new Daemon();
 const figures: Record<string, string> = {};
@@ -46,7 +46,7 @@ beforeAll(async () => {
     if (header.kind === 'picture') came.push({header, jpeg});
   }));
   await page.goto(daemon.link());
-}, 120_000);
+}, 300_000);
 afterEach(({task}) => { failed ||= task.result?.state === 'fail'; });
 afterAll(async () => {
   if (failed && page) await screenshot(page, 'failed');

@@ -23,7 +23,8 @@ int main(int argc, char** argv) try {
   test::MarkerSession film;
   film.lens = {{640, 480}, 600, 600, 318.3, 243.1, {-0.2, 0.05, 0, 0.001, 0}};
   film.frames = static_cast<int>(film.rate * std::atof(words[1].c_str()));
-  film.look.noise = 3;
+  film.drawn = 150;
+  film.look.samples = 3;
   test::record_marker(folder / "film", film);
   test::put_flame(folder / "results/candle/middle-frame", 128);
   for (int frame = 0; frame < 3; ++frame)

@@ -63,9 +63,12 @@ TEST_F(LiveFlameTest, TheFlameFollowsTheMarkerIsHeldAndGoes) {
     const auto seen = live->draw(Seconds(f / 30.0), picture, pool_);
     ASSERT_TRUE(seen.ok());
     EXPECT_EQ(seen->without, std::max(0, f - 9)) << f;
-    if (f < 10) EXPECT_EQ(seen->pose.from, TrackedPose::From::marker);
-    if (f < 15) EXPECT_GT(red(picture, f), 200) << f << " found, or held for five frames";
-    if (f >= 15) {
+    if (f < 10) {
+      EXPECT_EQ(seen->pose.from, TrackedPose::From::marker);
+    }
+    if (f < 15) {
+      EXPECT_GT(red(picture, f), 200) << f << " found, or held for five frames";
+    } else {
       EXPECT_EQ(seen->pose.from, TrackedPose::From::nothing);
       EXPECT_EQ(picture.bytes(), bare.bytes()) << "as it was filmed";
       EXPECT_EQ(seen->instead, "") << "there is no other either";

@@ -104,7 +104,10 @@ TEST_F(LiveArTest, AChildThatDiesOrHangsIsTold) {
               HasSubstr("ended with exit code 7: no memory"));
   EXPECT_THAT(with_script("kill -SEGV $$").start(request_, camera_).error().message(),
               HasSubstr("crashed by signal 11"));
-  EXPECT_THAT(with_script(R"(printf '\377\377\377\377\377' >&3; sleep 60)").start(request_, camera_).error().message(),
+  EXPECT_THAT(with_script(R"(printf '\377\377\377\377\377' >&3; sleep 60)")
+                  .start(request_, camera_)
+                  .error()
+                  .message(),
               HasSubstr("can't be understood"));
   options_.patience = Seconds(0.2);
   EXPECT_THAT(with_script("sleep 60").start(request_, camera_).error().message(),

@@ -81,9 +81,8 @@ INSTANTIATE_TEST_SUITE_P(Containers, SizeChangeTest, testing::Values("mkv", "mp4
 TEST_F(SizeChangeJoined, StreamsJoinedByCatAreNoTruncatedFile) {
   const auto refused = ar("cat.ts");
   EXPECT_EQ(refused.exit_code, 2);
-  EXPECT_THAT(
-      refused.err,
-      HasSubstr("cat.ts, frame 10: the video is damaged: data are missing, or another recording begins"));
+  EXPECT_THAT(refused.err, HasSubstr("cat.ts, frame "));
+  EXPECT_THAT(refused.err, HasSubstr("the video is damaged: data are missing, or another recording begins"));
   expect_nothing_written();
 }
 

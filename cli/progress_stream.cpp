@@ -256,4 +256,10 @@ void ProgressStream::failed(const Error& error) {
   send(message);
 }
 
+void ProgressStream::ar_picture(v1::ArPicture picture) {
+  v1::ChildMessage message;
+  *message.mutable_ar_picture() = std::move(picture);
+  send(message);
+}
+
 }  // namespace emberlock::cli

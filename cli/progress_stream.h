@@ -14,8 +14,8 @@
 
 namespace emberlock::cli {
 
-/// Reports the progress of a reconstruction to another program, as v1::ChildMessages on a descriptor. When
-/// nobody reads any more, reports are dropped and the work continues.
+/// Reports the progress of a reconstruction, or pictures with a flame, to another program, as
+/// v1::ChildMessages on a descriptor. When nobody reads any more, reports are dropped and the work continues.
 class ProgressStream {
  public:
   /// `fd` stays open and belongs to the caller. From here on this process is killed when its parent dies, and
@@ -41,6 +41,9 @@ class ProgressStream {
   /// done() without its pictures.
   void written(const recon::Report& report, const std::string& folder);
   void failed(const Error& error);
+  void ar_picture(v1::ArPicture picture);
+  /// Nobody reads any more.
+  [[nodiscard]] bool broken() const { return broken_; }
 
  private:
   using Clock = std::chrono::steady_clock;

@@ -41,6 +41,9 @@ class Api {
   /// Null: the frame isn't done, or no longer held.
   virtual std::shared_ptr<const v1::IterationPreview> reconstructed_frame(
       const v1::FrameRequest& request) = 0;
+  virtual Result<v1::ListResultsResponse> list_results() = 0;
+  virtual Result<v1::ArStatus> start_ar(const v1::ArRequest& request) = 0;
+  virtual Result<v1::ArStatus> stop_ar() = 0;
 };
 
 }  // namespace emberlock::daemon

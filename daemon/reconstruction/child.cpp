@@ -2,7 +2,6 @@
 #include "daemon/reconstruction/child.h"
 
 #include <algorithm>
-#include <cerrno>
 #include <chrono>
 #include <cmath>
 #include <csignal>
@@ -17,6 +16,7 @@
 #include <unistd.h>
 
 #include "base/clock.h"
+#include "daemon/reconstruction/child_output.h"
 #include "daemon/reconstruction/process.h"
 #include "daemon/reconstruction/request.h"
 #include "session/child_messages.h"
@@ -40,55 +40,7 @@ std::int64_t now_ns() {
   return std::chrono::duration_cast<std::chrono::nanoseconds>(Steady::now().time_since_epoch()).count();
 }
 
-/// What a child wrote to stderr, as far as a sentence can hold it.
-class LastWords {
- public:
-  void add(std::string_view bytes) {
-    held_.append(bytes);
-    if (held_.size() > kMost) held_.erase(0, held_.size() - kMost);
-  }
-  /// Its last lines, in printable ASCII.
-  [[nodiscard]] std::string text() const {
-    std::vector<std::string> lines(1);
-    for (const char c : held_) {
-      if (c == '\n' || c == '\r') {
-        if (!lines.back().empty()) lines.emplace_back();
-      } else {
-        lines.back() += c >= ' ' && c <= '~' ? c : '?';
-      }
-    }
-    if (lines.back().empty()) lines.pop_back();
-    if (lines.size() > kLines) lines.erase(lines.begin(), lines.end() - static_cast<std::ptrdiff_t>(kLines));
-    return fmt::format("{}", fmt::join(lines, " / "));
-  }
-
- private:
-  static constexpr std::size_t kMost = 2000;  // bytes
-  static constexpr std::size_t kLines = 4;
-  std::string held_;
-};
-
 constexpr int kLook = 100;  // ms, between two looks whether it shall end
-
-enum class ReadEnd { open, closed };
-
-using TakeBytes = std::function<void(std::string_view)>;
-
-/// Gives `take` what is there now; at most 1 MiB, so that nobody is kept from the rest.
-ReadEnd read_all(int fd, const TakeBytes& take) {
-  char bytes[65536];
-  for (int i = 0; i < 16; ++i) {
-    const ssize_t n = ::read(fd, bytes, sizeof bytes);
-    if (n > 0) {
-      take({bytes, static_cast<std::size_t>(n)});
-    } else if (n == 0 || (errno != EINTR && errno != EAGAIN)) {
-      return ReadEnd::closed;
-    } else if (errno == EAGAIN) {
-      return ReadEnd::open;
-    }
-  }
-  return ReadEnd::open;
-}
 
 }  // namespace
 

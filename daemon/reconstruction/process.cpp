@@ -10,6 +10,7 @@
 #include <spawn.h>
 #include <sys/mman.h>
 #include <sys/resource.h>
+#include <sys/socket.h>
 #include <sys/syscall.h>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -90,6 +91,18 @@ Result<ChildProcess> ChildProcess::spawn(const std::vector<std::string>& command
                                          std::string_view input) {
   EMBERLOCK_ASSIGN_OR_RETURN(const UniqueFd held, make_input(input, command[0]));
   return spawn(command, niceness, held);
+}
+
+Result<ChildProcess> ChildProcess::spawn_fed(const std::vector<std::string>& command, int niceness) {
+  int ends[2];  // of a socket, which tells of a child that is gone without a signal
+  if (::socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, ends) != 0)
+    return system_error(errno, "cannot be fed", command[0]);
+  UniqueFd ours(ends[0]);
+  const UniqueFd its(ends[1]);
+  ::fcntl(ours.get(), F_SETFL, O_NONBLOCK);
+  EMBERLOCK_ASSIGN_OR_RETURN(ChildProcess process, spawn(command, niceness, its));
+  process.input_ = std::move(ours);
+  return process;
 }
 
 Result<ChildProcess> ChildProcess::spawn(const std::vector<std::string>& command, int niceness,

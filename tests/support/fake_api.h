@@ -70,6 +70,11 @@ class FakeApi : public daemon::Api {
     remember("reconstructed_frame " + request.ShortDebugString());
     return on_reconstructed_frame ? on_reconstructed_frame(request) : nullptr;
   }
+  Result<v1::ListResultsResponse> list_results() override { return ask("list_results", on_list_results); }
+  Result<v1::ArStatus> start_ar(const v1::ArRequest& request) override {
+    return ask("start_ar", request, on_start_ar);
+  }
+  Result<v1::ArStatus> stop_ar() override { return ask("stop_ar", on_stop_ar); }
 
   /// Each call's name, with its request as one line: "align tolerance: \"100rows\"".
   [[nodiscard]] std::vector<std::string> calls() const {
@@ -93,6 +98,9 @@ class FakeApi : public daemon::Api {
   std::function<Result<v1::StylizationStatus>(const v1::EditRequest&)> on_edit_reconstruction;
   std::function<Result<v1::ReconstructionStatus>()> on_finish_reconstruction;
   std::function<std::shared_ptr<const v1::IterationPreview>(const v1::FrameRequest&)> on_reconstructed_frame;
+  std::function<Result<v1::ListResultsResponse>()> on_list_results;
+  std::function<Result<v1::ArStatus>(const v1::ArRequest&)> on_start_ar;
+  std::function<Result<v1::ArStatus>()> on_stop_ar;
   /// What verify, repair and export do; unset: they are done, and all is well.
   std::function<daemon::JobResult(const Observer&)> on_job;
   /// Why none of them can begin.

@@ -21,6 +21,7 @@ async function freePort(): Promise<number> {
 }
 
 export class Daemon {
+  /** Where it keeps what it records, and beside that what it reconstructs. */
   readonly folder = mkdtempSync(join(tmpdir(), 'emberlock-walk-'));
   private child?: ChildProcess;
   private said = '';

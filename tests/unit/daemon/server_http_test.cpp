@@ -296,6 +296,31 @@ TEST_F(ServerHttpTest, AFrameThatIsNotHeldIsNotFound) {
   EXPECT_EQ(json::parse(absent.body)["code"], "NOT_FOUND");
 }
 
+TEST_F(ServerHttpTest, AFlameOnAMarkerIsAskedForByNames) {
+  api.on_list_results = [] {
+    v1::ListResultsResponse listed;
+    listed.add_results()->set_session("candle");
+    return Result<v1::ListResultsResponse>(listed);
+  };
+  api.on_start_ar = [](const v1::ArRequest& request) -> Result<v1::ArStatus> {
+    if (request.session() != "candle")
+      return Error{ErrorKind::bad_input, "there is no such result", request.session()};
+    v1::ArStatus status;
+    status.set_state(v1::ArStatus::SHOWN);
+    return status;
+  };
+  api.on_stop_ar = [] {
+    return Result<v1::ArStatus>(Error{ErrorKind::refused, "none is shown", "the flame"});
+  };
+  serve();
+  EXPECT_EQ(ask(port, "POST", "/api/v1/Ar/Results", "{}").body, R"({"results":[{"session":"candle"}]})");
+  EXPECT_EQ(ask(port, "POST", "/api/v1/Ar/Start", R"({"session": "candle"})").body, R"({"state":"SHOWN"})");
+  EXPECT_EQ(ask(port, "POST", "/api/v1/Ar/Start", R"({"session": "../candle"})").status, 400);
+  EXPECT_EQ(ask(port, "POST", "/api/v1/Ar/Start", R"({"path": "/etc"})").status, 400)
+      << "there is no such field";
+  EXPECT_EQ(ask(port, "POST", "/api/v1/Ar/Stop", "{}").status, 409);
+}
+
 TEST_F(ServerHttpTest, AJobIsCancelledByItsNumberAndSaysSo) {
   test::EndlessJob endless;
   serve();

@@ -213,7 +213,7 @@ void ProgressStream::done(const recon::Outcome& outcome, const recon::Scene& sce
 
 void ProgressStream::stylized(const v1::StylizationStatus& status, const v1::Iteration& iteration,
                               const recon::RadianceImage& edited, const recon::RadianceImage& rendered,
-                              const recon::Volume& volume) {
+                              const recon::Volume* volume) {
   if (broken_) return;
   v1::ChildMessage message;
   v1::IterationPreview& shown = *message.mutable_iteration();
@@ -222,7 +222,7 @@ void ProgressStream::stylized(const v1::StylizationStatus& status, const v1::Ite
   shown.set_camera_id(status.view());
   shown.set_captured_jpeg(jpeg(edited));
   shown.set_rendered_jpeg(jpeg(rendered));
-  add_volume(shown, volume);
+  if (volume != nullptr) add_volume(shown, *volume);
   send(message);
 }
 

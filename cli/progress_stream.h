@@ -30,11 +30,11 @@ class ProgressStream {
   /// the solve's time.
   void iteration(const recon::Preview& preview, const recon::Scene& scene,
                  const recon::ComputeOptions& compute);
-  /// What a stylization shows: the picture of `status.view` as edited, the volume as that view sees it, and
-  /// the volume.
+  /// What a stylization shows: the picture of `status.view` as edited, the volume as that view sees it, and,
+  /// if it is given, the volume.
   void stylized(const v1::StylizationStatus& status, const v1::Iteration& iteration,
                 const recon::RadianceImage& edited, const recon::RadianceImage& rendered,
-                const recon::Volume& volume);
+                const recon::Volume* volume);
   void edited(const v1::ChildMessage::Edited& edited);
   /// With temperatures and errors as far as the outcome has them.
   void done(const recon::Outcome& outcome, const recon::Scene& scene, const std::string& folder);

@@ -25,9 +25,10 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr int kWidestPreview = 640;                            // of a preview, in pixels
-constexpr auto kApart = std::chrono::milliseconds(50);         // previews, but for the first after a step
-constexpr auto kSignOfLife = std::chrono::milliseconds(1000);  // while nothing is done
+constexpr int kWidestPreview = 640;                             // of a preview, in pixels
+constexpr auto kApart = std::chrono::milliseconds(50);          // previews, but for the first after a step
+constexpr auto kVolumesApart = std::chrono::milliseconds(400);  // which are many times a picture's bytes
+constexpr auto kSignOfLife = std::chrono::milliseconds(1000);   // while nothing is done
 
 /// Where a picture's bytes are kept: under a name that is made of them.
 Result<fs::path> file_for(const std::string& bytes, const char* where, const fs::path& folder) {
@@ -166,10 +167,12 @@ void StylizeStream::show() {
   iteration.set_input_rmse(now.passes() > 0 ? now.residual() : recon::all_channels(last_.input_rmse));
   const recon::RadianceImage& edited = *stylization_.scene().views[view_].image;
   const apply::EditedVolume shown = stylization_.shown();
+  const bool with_volume = pauses() || Clock::now() >= volume_due_;
   stream_.stylized(now, iteration, recon::shrunk(edited, recon::preview_size(edited.size, kWidestPreview)),
-                   stylization_.preview(shown, view_, kWidestPreview), shown.volume);
+                   stylization_.preview(shown, view_, kWidestPreview), with_volume ? &shown.volume : nullptr);
   stream_.progress(1, pauses() ? std::string("waits for a step") : fmt::format("pass {}", now.passes()));
   due_ = Clock::now() + kApart;
+  if (with_volume) volume_due_ = Clock::now() + kVolumesApart;
 }
 
 v1::StylizationStatus StylizeStream::status() const {

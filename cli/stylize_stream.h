@@ -52,9 +52,10 @@ class StylizeStream {
   ProgressStream& stream_;
   session::EditRequestParser parser_;
   std::size_t view_ = 0;
-  int end_ = 0;            // passes in all
-  Seconds worked_{0};      // on passes
-  bool edited_ = false;    // since the last pass
+  int end_ = 0;          // passes in all
+  Seconds worked_{0};    // on passes
+  bool edited_ = false;  // since the last pass
+  Clock::time_point volume_due_;
   Clock::time_point due_;  // of a preview
 };
 

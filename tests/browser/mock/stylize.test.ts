@@ -205,7 +205,7 @@ describe('what the daemon says', () => {
 
   test('another view is asked for; one that is held out can\'t be', async () => {
     const {page} = await stylize();
-    await page.getByLabel('View', {exact: true}).selectOption('virtual-04');
+    await page.getByRole('combobox', {name: 'View'}).selectOption('virtual-04');
     await page.waitForSelector('.stylized[data-view="virtual-04"]');
     expect(asked()).toEqual([{view: 'virtual-04'}]);
     expect(await page.locator('#stylization option[value=virtual-10]').isDisabled()).toBe(true);

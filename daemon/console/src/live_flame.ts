@@ -61,7 +61,7 @@ export class LiveFlame {
   private readonly form: HTMLFormElement;
   private readonly sign = new Sign();
   private readonly word = el('strong');
-  private readonly numbers = el('span', {class: 'numbers'});
+  private readonly numbers = el('span', {class: 'marker-numbers'});
   private readonly told = el('p', {class: 'told', hidden: true}, this.sign.root, el('span', {role: 'status'}, this.word), this.numbers);
   private readonly elsewhere = el('p', {class: 'note', hidden: true});
   private camera = '';

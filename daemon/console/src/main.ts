@@ -17,7 +17,7 @@ import {Record} from './record';
 import {Reconstruction} from './reconstruction';
 import {Sessions} from './sessions';
 import {Strobe} from './strobe';
-import {Stylization} from './stylize/panel';
+import {Stylization} from './stylize/stylization';
 import {Token} from './token';
 
 const header = new Header();
@@ -85,7 +85,7 @@ const link: Link = new Link({
       stylization.volume(head);
       reconstruction.showVolume(head, bytes);
     } else {
-      void stylization.picture(head, bytes);
+      stylization.picture(head, bytes);
       void reconstruction.view(head, bytes);
     }
   },

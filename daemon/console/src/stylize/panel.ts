@@ -41,7 +41,7 @@ class Newest {
   }
 }
 
-export class Stylization implements Bench {
+export class Panel implements Bench {
   private readonly sign = new Sign('GREEN');
   private readonly word = el('span', {class: 'word'});
   private readonly doing = el('p', {role: 'status'});

@@ -82,8 +82,8 @@ v1::ArStatus::Pose word_of(apply::TrackedPose::From from) {
   return v1::ArStatus::LOST;
 }
 
-Result<v1::ArPicture> picture_of(const v1::ArInput::Frame& told, ImageSize size, apply::LiveFlame& flame,
-                                 recon::Pool& pool) {
+Result<v1::ArPicture> frame_with_flame(const v1::ArInput::Frame& told, ImageSize size,
+                                       apply::LiveFlame& flame, recon::Pool& pool) {
   Image frame(ImageLayout{size, PixelFormat::rgb8, 8});
   if (frame.bytes().size() != told.rgb().size()) return unexpected("a frame with other bytes than pixels");
   std::memcpy(frame.bytes().data(), told.rgb().data(), told.rgb().size());
@@ -112,7 +112,7 @@ Status draw_live(ProgressStream& stream) try {
     if (!input) break;
     if (!input->has_frame()) return unexpected("something else than a frame");
     EMBERLOCK_ASSIGN_OR_RETURN(v1::ArPicture picture,
-                               picture_of(input->frame(), scene.lens.size, flame, pool));
+                               frame_with_flame(input->frame(), scene.lens.size, flame, pool));
     stream.ar_picture(std::move(picture));
   }
   return {};

@@ -18,8 +18,8 @@ namespace emberlock::cli {
 namespace {
 
 struct Print {
-  Image picture;  ///< gray8, with its white margin
-  double pixel;   ///< millimetres
+  Image picture;     ///< gray8, with its white margin
+  double pixel = 0;  ///< millimetres
 };
 
 Print print_of(const apply::Marker& marker) {

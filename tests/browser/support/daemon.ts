@@ -20,6 +20,21 @@ async function freePort(): Promise<number> {
   });
 }
 
+/** The configuration's part of a rig of virtual cameras that film a flame, and their strobe. */
+export const virtualRig = (name: string, cameras: number, size: string): string => `
+[rig]
+name = "${name}"
+[rig.virtual]
+scene = "flame"
+seed = 1
+[[rig.camera]]
+driver = "virtual"
+count = ${cameras}
+size = "${size}"
+[rig.strobe]
+driver = "virtual"
+`;
+
 export class Daemon {
   /** Where it keeps what it records, and beside that what it reconstructs. */
   readonly folder = mkdtempSync(join(tmpdir(), 'emberlock-walk-'));

@@ -9,25 +9,12 @@ import type {Browser, Page} from 'playwright-core';
 import {afterAll, beforeAll, expect, test} from 'vitest';
 
 import {openPage, screenshot, startChromium, until} from '../support/chromium';
-import {Daemon} from '../support/daemon';
+import {Daemon, virtualRig} from '../support/daemon';
 
 const kBuild = fileURLToPath(new URL('../../../build/release', import.meta.url));
 const kConsole = process.env.EMBERLOCK_CONSOLE ?? `${kBuild}/console`;
 const kBin = process.env.EMBERLOCK_BIN ?? `${kBuild}/bin`;
 const kVoxels = Number(process.env.EMBERLOCK_VOXELS ?? 64);
-const rigOf = (cameras: number, size: string): string => `
-[rig]
-name = "virtual cameras"
-[rig.virtual]
-scene = "flame"
-seed = 1
-[[rig.camera]]
-driver = "virtual"
-count = ${cameras}
-size = "${size}"
-[rig.strobe]
-driver = "virtual"
-`;
 
 const daemon = new Daemon();
 const figures: Record<string, string> = {};
@@ -55,13 +42,13 @@ const light = (): Promise<number> => page.locator('.stylized').evaluate(element 
 
 beforeAll(async () => {
   if (!existsSync(`${kBin}/emberlockd`)) throw new Error(`${kBin}/emberlockd is not there: build it, or name its folder in EMBERLOCK_BIN`);
-  await daemon.start(kBin, kConsole, rigOf(11, '640x480'));
+  await daemon.start(kBin, kConsole, virtualRig('virtual cameras', 11, '640x480'));
   await until(async () => (await daemon.status()).phase, phase => phase === 'IDLE', 'the rig is idle', 60);
   await daemon.call('Capture/Record', {name: 'candle', unlocked: true, seconds: 2});
   await until(async () => (await daemon.status()).phase, phase => phase === 'IDLE', 'it is recorded', 90);
   // Cameras that are drawn take the processor from what is measured.
   await daemon.end();
-  await daemon.start(kBin, kConsole, rigOf(1, '64x48'), kVoxels);
+  await daemon.start(kBin, kConsole, virtualRig('virtual cameras', 1, '64x48'), kVoxels);
   browser = await startChromium();
   page = (await openPage(browser, daemon.url, {width: 1600, height: 1000})).page;
   await page.goto(daemon.link());

@@ -35,7 +35,7 @@ const std::vector<VerbGroup>& verb_groups() {
       {"Cameras", {"devices", "smear", "calibrate"}},
       {"Films of other cameras", {"verify", "import"}},
       {"Volumes",
-       {"reconstruct", "view", "render", "scene", "ar", "stylize", "export", "measure", "tradeoff",
+       {"reconstruct", "batch", "view", "render", "scene", "ar", "stylize", "export", "measure", "tradeoff",
         "evaluate"}}};
   return groups;
 }

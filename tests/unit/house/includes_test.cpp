@@ -39,7 +39,7 @@ const std::map<std::string, std::set<std::string>> kMayInclude{
 const std::map<std::string, std::vector<std::string>> kInnerOrder{
     {"recon",
      {"kernels", "compute", "calibrate", "preprocess", "hull", "effects", "render", "adjust", "temperature",
-      "synthetic", "export", "pipeline"}},
+      "synthetic", "export", "pipeline", "batch"}},
     {"smear_sync", {"detect", "clocks", "sensors", "align", "verify"}},
     {"session", {"media"}},
 };

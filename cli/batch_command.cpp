@@ -31,7 +31,7 @@ namespace fs = std::filesystem;
 /// Options that say how a rank works, or are compared by themselves: results don't depend on them, but for
 /// the device, which ranks may have each of its own.
 const std::set<std::string>& of_a_run() {
-  static const std::set<std::string> names{"SESSION", "--out",   "--frames",   "--every", "--chunk",
+  static const std::set<std::string> names{"SESSION",   "--out",    "--frames",   "--every", "--chunk",
                                            "--threads", "--device", "--patience", "--help"};
   return names;
 }
@@ -133,8 +133,7 @@ void add_submit(CLI::App& batch) {
   verb->add_option("--gpus", job.gpus, "GPUs of each of them: one a rank, ranks beyond them use the CPU")
       ->check(CLI::Range(0, 1024))
       ->capture_default_str();
-  verb->add_option("--cpus", job.cpus, "CPU threads of each rank [Slurm's rule]")
-      ->check(CLI::Range(1, 1024));
+  verb->add_option("--cpus", job.cpus, "CPU threads of each rank [Slurm's rule]")->check(CLI::Range(1, 1024));
   verb->add_option("--time", job.time, "Time limit, as sbatch takes it, such as 2:00:00 [the partition's]");
   verb->add_option("--sbatch", job.further,
                    "A further option of sbatch's, such as --sbatch=--partition=NAME; may be given again")

@@ -42,7 +42,7 @@ using recon::BatchPlan;
 using recon::Ledger;
 
 constexpr std::uint64_t kMostFramesOfBatch = 100'000;
-constexpr const char* kTold = "told";  ///< in the ledger, where the report of all is written
+constexpr const char* kTold = "told";      ///< in the ledger, where the report of all is written
 constexpr const char* kOfSlurm = "slurm";  ///< `batch submit` puts it beside the ledger
 
 /// What tells a session from others.
@@ -74,8 +74,8 @@ class BatchRank {
     std::vector<std::string> names;
     for (const auto& [name, chunk] : chunks_) names.push_back(name);
     ledger_.emplace(ledger_of(out_), std::move(names), me_.name());
-    EMBERLOCK_ASSIGN_OR_RETURN(pulse_, recon::Pulse::start(ledger_->folder() / "workers", me_,
-                                                           Seconds(arguments_.patience_s)));
+    EMBERLOCK_ASSIGN_OR_RETURN(
+        pulse_, recon::Pulse::start(ledger_->folder() / "workers", me_, Seconds(arguments_.patience_s)));
     if (rank_.number == 0) {
       EMBERLOCK_RETURN_IF_ERROR(try_again_what_failed());
       progress_.emplace(*ledger_, plan_);
@@ -97,9 +97,9 @@ class BatchRank {
   /// Told to the solver, too.
   Result<std::string> choose_device() {
     EMBERLOCK_ASSIGN_OR_RETURN(const recon::ReconstructOptions options, options_of(arguments_.reconstruct));
-    EMBERLOCK_ASSIGN_OR_RETURN(const recon::Device device,
-                               recon::device_of(rank_, options.solve.compute.device,
-                                                std::getenv("SLURM_GPUS_PER_TASK") != nullptr));
+    EMBERLOCK_ASSIGN_OR_RETURN(
+        const recon::Device device,
+        recon::device_of(rank_, options.solve.compute.device, std::getenv("SLURM_GPUS_PER_TASK") != nullptr));
     arguments_.reconstruct.device = recon::name(device);
     if (arguments_.reconstruct.threads == 0)
       arguments_.reconstruct.threads = recon::threads_of(
@@ -209,13 +209,12 @@ class BatchRank {
     ReconstructArguments arguments = arguments_.reconstruct;
     arguments.out = claim.work.string();
     arguments.voxels = std::to_string(plan_.voxels);
-    const SequenceWatch watch{
-        Interrupt::asked, [](const std::string&) {},
-        [this](const std::string&) -> Progress {
-          if (!progress_) return {};
-          return [this](double, std::string_view) { progress_->show(); };
-        },
-        [](const Written&, const fs::path&) { return Status(); }};
+    const SequenceWatch watch{Interrupt::asked, [](const std::string&) {},
+                              [this](const std::string&) -> Progress {
+                                if (!progress_) return {};
+                                return [this](double, std::string_view) { progress_->show(); };
+                              },
+                              [](const Written&, const fs::path&) { return Status(); }};
     std::error_code ec;
     const bool goes_on = !fs::is_empty(claim.work, ec);
     Result<report::SequenceTold> told = frames_in_turn(arguments, chunk.frames, watch);

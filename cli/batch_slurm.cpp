@@ -119,9 +119,8 @@ Result<std::string> job_state(const fs::path& out) {
   if (!fs::exists(file, ec)) return std::string();
   EMBERLOCK_ASSIGN_OR_RETURN(const std::string text, read_file(file));
   const std::string job = text.substr(0, text.find('\n'));
-  EMBERLOCK_ASSIGN_OR_RETURN(
-      const Ran ran, run_program({"squeue", "--noheader", "--jobs=" + job,
-                                  "--format=%T for %M, %L left, on %D nodes %R"}));
+  EMBERLOCK_ASSIGN_OR_RETURN(const Ran ran, run_program({"squeue", "--noheader", "--jobs=" + job,
+                                                         "--format=%T for %M, %L left, on %D nodes %R"}));
   const bool unknown = ran.output.find("Invalid job id") != std::string::npos;
   if (ran.status != 0 && !unknown)
     return Error{ErrorKind::refused, "squeue failed: " + ran.output, "job " + job};

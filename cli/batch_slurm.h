@@ -12,10 +12,10 @@ namespace emberlock::cli {
 /// What Slurm is asked for.
 struct SlurmJob {
   int nodes = 1;
-  int ranks = 1;                        ///< a node
-  int gpus = 0;                         ///< a node
-  int cpus = 0;                         ///< a rank; 0: Slurm's rule
-  std::string time = {};                ///< the limit, as sbatch takes it
+  int ranks = 1;                          ///< a node
+  int gpus = 0;                           ///< a node
+  int cpus = 0;                           ///< a rank; 0: Slurm's rule
+  std::string time = {};                  ///< the limit, as sbatch takes it
   std::vector<std::string> further = {};  ///< options of sbatch's
 };
 
@@ -28,8 +28,8 @@ std::string sbatch_script(const SlurmJob& job, const std::vector<std::string>& w
 /// Errors: sbatch isn't installed, or refuses.
 Result<std::string> submit(const std::string& script, const std::filesystem::path& out);
 
-/// What squeue tells of the job that was submitted for this folder; empty where none was. Errors: squeue isn't
-/// installed, or fails.
+/// What squeue tells of the job that was submitted for this folder; empty where none was. Errors: squeue
+/// isn't installed, or fails.
 Result<std::string> job_state(const std::filesystem::path& out);
 
 }  // namespace emberlock::cli

@@ -47,15 +47,16 @@ std::vector<std::string> batch_words(const BatchTold& told) {
   const auto done = std::count_if(told.chunks.begin(), told.chunks.end(),
                                   [](const BatchChunk& chunk) { return chunk.done; });
   std::vector<std::string> words;
-  words.push_back(fmt::format("{} of {} frames are volumes, {} failed; {} of {} chunks are done, by {} ranks",
-                              told.volumes(), told.planned(), told.failed(), done, told.chunks.size(),
-                              shares_of(told).size()));
+  const std::size_t ranks = shares_of(told).size();
+  words.push_back(fmt::format(
+      "{} of {} frames are volumes, {} failed; {} of {} chunks are done, by {} rank{}", told.volumes(),
+      told.planned(), told.failed(), done, told.chunks.size(), ranks, ranks == 1 ? "" : "s"));
   if (!told.losses.empty())
-    words.push_back(fmt::format("lost on the way, and done again or gone on with: {}",
-                                fmt::join(told.losses, ", ")));
+    words.push_back(
+        fmt::format("lost on the way, and done again or gone on with: {}", fmt::join(told.losses, ", ")));
   if (!told.given_up.empty())
-    words.push_back(fmt::format("given up, as whoever did them died each time: {}",
-                                fmt::join(told.given_up, ", ")));
+    words.push_back(
+        fmt::format("given up, as whoever did them died each time: {}", fmt::join(told.given_up, ", ")));
   return words;
 }
 

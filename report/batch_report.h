@@ -15,8 +15,8 @@ struct BatchChunk {
   std::string name;
   std::size_t planned = 0;  ///< frames
   std::size_t volumes = 0;
-  std::size_t failed = 0;   ///< frames that became none, or weren't tried since the ones before all failed
-  bool done = false;        ///< what follows is known where it is
+  std::size_t failed = 0;  ///< frames that became none, or weren't tried since the ones before all failed
+  bool done = false;       ///< what follows is known where it is
   int rank = 0;
   std::string host = {}, device = {};
   Seconds took{0};  ///< loading, reconstruction and writing of its frames

@@ -132,9 +132,8 @@ Result<std::optional<Ledger::Claim>> Ledger::take_from(const std::string& chunk,
   }
   EMBERLOCK_RETURN_IF_ERROR(put_empty_file(folder_ / "lost" / theirs));
   const std::vector<std::string> lost = losses();
-  const auto died = std::count_if(lost.begin(), lost.end(), [&](const std::string& name) {
-    return parts_of(name).first == chunk;
-  });
+  const auto died = std::count_if(lost.begin(), lost.end(),
+                                  [&](const std::string& name) { return parts_of(name).first == chunk; });
   if (static_cast<std::size_t>(died) >= kMostLosses) {
     EMBERLOCK_ASSIGN_OR_RETURN([[maybe_unused]] const Moved moved,
                                move(claimed, folder_ / "given_up" / chunk));
@@ -152,7 +151,8 @@ Result<std::optional<Ledger::Claim>> Ledger::take_from(const std::string& chunk,
 /// With what is left of an earlier attempt, if anything is.
 Result<std::optional<Ledger::Claim>> Ledger::begin(Claim claim, const fs::path& left) {
   const auto begun = [&]() -> Status {
-    EMBERLOCK_ASSIGN_OR_RETURN(const Moved moved, left.empty() ? Moved::absent : move_to_own(left, claim.work));
+    EMBERLOCK_ASSIGN_OR_RETURN(const Moved moved,
+                               left.empty() ? Moved::absent : move_to_own(left, claim.work));
     if (moved == Moved::yes) return {};
     std::error_code ec;
     fs::create_directory(claim.work, ec);
@@ -160,7 +160,7 @@ Result<std::optional<Ledger::Claim>> Ledger::begin(Claim claim, const fs::path& 
     return {};
   }();
   if (begun.ok()) return std::optional(std::move(claim));
-  EMBERLOCK_RETURN_IF_ERROR(give_back(claim));
+  (void)give_back(claim);  // as far as that can be; what came first is told
   return begun.error();
 }
 
@@ -184,15 +184,14 @@ Result<bool> Ledger::finish(const Claim& claim) {
 }
 
 Status Ledger::give_back(const Claim& claim) {
-  EMBERLOCK_ASSIGN_OR_RETURN(const Moved kept, move(claim.work, folder_ / "partial" / claim.chunk));
-  if (kept == Moved::occupied) {
+  const Result<Moved> kept = move(claim.work, folder_ / "partial" / claim.chunk);
+  if (kept && *kept == Moved::occupied) {
     std::error_code ec;
     fs::remove_all(claim.work, ec);
   }
-  EMBERLOCK_ASSIGN_OR_RETURN(
-      [[maybe_unused]] const Moved moved,
-      move(folder_ / "claims" / mine(claim.chunk), folder_ / "todo" / claim.chunk));
-  return {};
+  EMBERLOCK_ASSIGN_OR_RETURN([[maybe_unused]] const Moved moved,
+                             move(folder_ / "claims" / mine(claim.chunk), folder_ / "todo" / claim.chunk));
+  return kept ? Status() : Status(kept.error());
 }
 
 Status Ledger::reopen(const std::string& chunk) {
@@ -206,6 +205,7 @@ Status Ledger::reopen(const std::string& chunk) {
   }
   // Claimed first: the chunk is in someone's hands while its result moves.
   EMBERLOCK_RETURN_IF_ERROR(put_empty_file(folder_ / "claims" / mine(chunk)));
+  fs::remove_all(folder_ / "partial" / chunk, ec);  // of an attempt that came second
   EMBERLOCK_ASSIGN_OR_RETURN([[maybe_unused]] const Moved moved,
                              move(result(chunk), folder_ / "work" / mine(chunk)));
   return give_back({chunk, folder_ / "work" / mine(chunk)});

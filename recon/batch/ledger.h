@@ -31,9 +31,9 @@ enum class Life {
 ///     lost/CHUNK.WORKER     who died of it, or fell silent
 ///     given_up/CHUNK        kMostLosses of them did
 ///
-/// A chunk lies in todo, claims, given_up or done at any moment. Each attempt writes into a folder of its own,
-/// and the first one that is finished becomes done/CHUNK: whoever was taken for dead and wasn't harms nothing.
-/// Names of chunks and workers have no '/', those of chunks no '.'. One object serves one thread.
+/// A chunk lies in todo, claims, given_up or done at any moment. Each attempt writes into a folder of its
+/// own, and the first one that is finished becomes done/CHUNK: whoever was taken for dead and wasn't harms
+/// nothing. Names of chunks and workers have no '/', those of chunks no '.'. One object serves one thread.
 class Ledger {
  public:
   using LifeOf = std::function<Life(const std::string& worker)>;
@@ -58,8 +58,8 @@ class Ledger {
   /// The first chunk that nobody does, else one whose worker is no longer alive; nothing where there is none.
   /// Error: io; the chunk is nobody's then.
   Result<std::optional<Claim>> take(const LifeOf& life_of);
-  /// What is in the work's folder becomes the chunk's result; false where another attempt was finished before,
-  /// or the folder was taken away from one taken for dead. Error: io.
+  /// What is in the work's folder becomes the chunk's result; false where another attempt was finished
+  /// before, or the folder was taken away from one taken for dead. Error: io.
   Result<bool> finish(const Claim& claim);
   /// Whoever takes it next goes on with what is in the work's folder. Error: io.
   Status give_back(const Claim& claim);

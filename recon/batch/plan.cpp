@@ -47,9 +47,8 @@ std::vector<Chunk> chunks_of(const BatchPlan& plan) {
 
 std::string to_json(const BatchPlan& plan) {
   const nlohmann::ordered_json json = {
-      {"format", kFormat},     {"version", 1},           {"input", plan.input},
-      {"session", plan.session}, {"chunk", plan.chunk},    {"voxels", plan.voxels},
-      {"options", plan.options}, {"frames", plan.frames}};
+      {"format", kFormat},   {"version", 1},          {"input", plan.input},     {"session", plan.session},
+      {"chunk", plan.chunk}, {"voxels", plan.voxels}, {"options", plan.options}, {"frames", plan.frames}};
   return json.dump(1, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n";
 }
 
@@ -64,8 +63,8 @@ Result<BatchPlan> parse_plan(std::string_view text, const std::string& where) tr
   json.at("voxels").get_to(plan.voxels);
   json.at("options").get_to(plan.options);
   json.at("frames").get_to(plan.frames);
-  const bool rising = std::adjacent_find(plan.frames.begin(), plan.frames.end(), std::greater_equal<>()) ==
-                      plan.frames.end();
+  const bool rising =
+      std::adjacent_find(plan.frames.begin(), plan.frames.end(), std::greater_equal<>()) == plan.frames.end();
   if (plan.frames.empty() || !rising || plan.chunk < 1 || plan.voxels < 1)
     return Error{ErrorKind::bad_input, "holds no frames, or numbers out of range", where,
                  "Give another --out"};
@@ -82,8 +81,8 @@ Status same_run(const BatchPlan& planned, const BatchPlan& asked, const std::str
   if (planned.session != asked.session)
     return differs(fmt::format("holds a batch of another session: {} ({})", planned.input, planned.session));
   if (planned.frames != asked.frames)
-    return differs(fmt::format("holds a batch of frames {}, not {}", range_of(planned.frames),
-                               range_of(asked.frames)));
+    return differs(
+        fmt::format("holds a batch of frames {}, not {}", range_of(planned.frames), range_of(asked.frames)));
   if (asked.chunk != 0 && planned.chunk != asked.chunk)
     return differs(fmt::format("holds a batch in chunks of {} frames, not {}", planned.chunk, asked.chunk));
   std::set<std::string> names;

@@ -37,7 +37,8 @@ std::string line_of(const fs::path& path) {
 
 std::string this_boot() {
   std::error_code ec;
-  return line_of("/proc/sys/kernel/random/boot_id") + " " + fs::read_symlink("/proc/self/ns/pid", ec).string();
+  return line_of("/proc/sys/kernel/random/boot_id") + " " +
+         fs::read_symlink("/proc/self/ns/pid", ec).string();
 }
 
 /// 0 where there is no such process, or one that has ended and waits for its parent.
@@ -75,17 +76,17 @@ Worker Worker::here(int rank, std::string device) {
 std::string Worker::name() const { return fmt::format("{}-{}-{}", host, pid, started); }
 
 std::string to_json(const Worker& worker) {
-  const nlohmann::ordered_json json = {
-      {"host", worker.host},       {"boot", worker.boot}, {"pid", worker.pid},
-      {"started", worker.started}, {"rank", worker.rank}, {"device", worker.device}};
+  const nlohmann::ordered_json json = {{"host", worker.host}, {"boot", worker.boot},
+                                       {"pid", worker.pid},   {"started", worker.started},
+                                       {"rank", worker.rank}, {"device", worker.device}};
   return json.dump(1) + "\n";
 }
 
 Result<Worker> parse_worker(std::string_view text, const std::string& where) try {
   const auto json = nlohmann::json::parse(text);
-  return Worker{json.at("host").get<std::string>(),     json.at("boot").get<std::string>(),
-                json.at("pid").get<std::int64_t>(),     json.at("started").get<std::uint64_t>(),
-                json.at("rank").get<int>(),             json.at("device").get<std::string>()};
+  return Worker{json.at("host").get<std::string>(), json.at("boot").get<std::string>(),
+                json.at("pid").get<std::int64_t>(), json.at("started").get<std::uint64_t>(),
+                json.at("rank").get<int>(),         json.at("device").get<std::string>()};
 } catch (const std::exception& e) {
   return Error{ErrorKind::bad_input, e.what(), where};
 }

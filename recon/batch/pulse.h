@@ -41,9 +41,9 @@ Result<Worker> parse_worker(std::string_view json, const std::string& where);
 /// whose processes it doesn't see.
 std::optional<bool> runs_here(const Worker& worker);
 
-/// WORKERS/NAME says who a worker is, and is touched every so often while it lives: by a thread of its own, so
-/// that long steps don't matter. Others are alive as long as the time of their file changes while one looks
-/// on: nobody's clock is compared with another's. Those of this machine are asked the kernel for.
+/// WORKERS/NAME says who a worker is, and is touched every so often while it lives: by a thread of its own,
+/// so that long steps don't matter. Others are alive as long as the time of their file changes while one
+/// looks on: nobody's clock is compared with another's. Those of this machine are asked the kernel for.
 class Pulse {
  public:
   /// Error: io.

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// `emberlock batch` as mpirun starts it, on a flame of simulated cameras: volumes are those of sequences of its
-// chunks, bit for bit, however many ranks there are, whoever dies, and however often it was stopped.
+// `emberlock batch` as mpirun starts it, on a flame of simulated cameras: volumes are those of sequences of
+// its chunks, bit for bit, however many ranks there are, whoever dies, and however often it was stopped.
 #include <chrono>
 #include <csignal>
 #include <filesystem>
@@ -42,7 +42,7 @@ struct Plain {
   std::vector<std::string> volumes;
 
   Plain() {
-    run("simulate flame --cells 24 --rig virtual:4 --image 64x64 --frames " + std::to_string(kFrames) +
+    run("simulate flame --cells 8 --rig virtual:4 --image 64x64 --frames " + std::to_string(kFrames) +
         " --out " + (temp / "film").string());
     for (int first = 0; first < kFrames; first += kChunk) {
       const int last = std::min(first + kChunk, kFrames) - 1;
@@ -203,9 +203,9 @@ TEST_F(Batch, AFullDiskStopsItCleanlyAndMoreRoomLetsItGoOn) {
   // The ledger and a chunk or so fit; what is there moves to the real disk for the rest.
   const std::string batch = fmt::format("{} batch {} --frames 0:{} --chunk {} --out {}/out{}", kEmberlock,
                                         plain().session.string(), kFrames - 1, kChunk, disk, kOptions);
-  const Shell full = shell(on_disk(fmt::format(
-      "mount -t tmpfs -o size={}k none {}; {}; echo ended by $?; cp -a {}/out {}", 1400, disk, batch, disk,
-      out_.string())));
+  const Shell full =
+      shell(on_disk(fmt::format("mount -t tmpfs -o size={}k none {}; {}; echo ended by $?; cp -a {}/out {}",
+                                1400, disk, batch, disk, out_.string())));
   EXPECT_THAT(full.output, HasSubstr("No space left on device"));
   EXPECT_THAT(full.output, HasSubstr("ended by 1")) << full.output;
   EXPECT_THAT(names_in("claims"), testing::IsEmpty()) << full.output;

@@ -86,13 +86,14 @@ TEST_F(BatchCommandTest, TheLedgerOfSomethingElseIsRefused) {
     EXPECT_EQ(result.exit_code, 2) << result.err;
     return result.err;
   };
-  EXPECT_THAT(refused({"--frames", "0:2", "--voxels", "8"}), HasSubstr("holds a batch of frames 0:1, not 0:2"));
+  EXPECT_THAT(refused({"--frames", "0:2", "--voxels", "8"}),
+              HasSubstr("holds a batch of frames 0:1, not 0:2"));
   EXPECT_THAT(refused({"--frames", "0:1", "--voxels", "9"}), HasSubstr("--voxels was \"8\", and is \"9\""));
   EXPECT_THAT(refused({"--frames", "0:1"}), HasSubstr("--voxels was \"8\", and is not given"));
   EXPECT_THAT(refused({"--frames", "0:1", "--voxels", "8", "--chunk", "1"}), HasSubstr("chunks of 5 frames"));
   test::record(temp_ / "another", {{64, 48}, PixelFormat::gray8, 8}, 4, test::small_disk_options());
-  const auto another = test::run_verb(
-      add_batch, {"batch", (temp_ / "another").string(), "--out", out_.string(), "--frames", "0:1", "--voxels", "8"});
+  const auto another = test::run_verb(add_batch, {"batch", (temp_ / "another").string(), "--out",
+                                                  out_.string(), "--frames", "0:1", "--voxels", "8"});
   EXPECT_EQ(another.exit_code, 2);
   EXPECT_THAT(another.err, HasSubstr("holds a batch of another session"));
   std::ofstream(out_ / "batch" / "plan.json") << "{}";
@@ -171,7 +172,8 @@ TEST(BatchProgressTest, TimeLeftFollowsFromTheRateSinceTheBegin) {
   EXPECT_EQ(progress_words(100, 1000, 0, Seconds(10)), "100 of 1000 frames") << "nothing is known yet";
   EXPECT_EQ(progress_words(100, 1000, 50, Seconds(10)),
             "100 of 1000 frames, 5 frames a second, 3 min 0 s left");
-  EXPECT_EQ(progress_words(999, 1000, 1, Seconds(30)), "999 of 1000 frames, 0.033 frames a second, 30 s left");
+  EXPECT_EQ(progress_words(999, 1000, 1, Seconds(30)),
+            "999 of 1000 frames, 0.033 frames a second, 30 s left");
   EXPECT_EQ(progress_words(1000, 1000, 1000, Seconds(30)), "1000 of 1000 frames");
   EXPECT_THAT(progress_words(1, 10001, 1, Seconds(1)), HasSubstr("2 h 46 min left"));
 }

@@ -69,7 +69,8 @@ TEST(BatchPlanTest, AnotherRunIsToldByItsFirstDifference) {
   EXPECT_EQ(words([](BatchPlan& p) { p.chunk = 0; }), "") << "not asked for";
   EXPECT_EQ(words([](BatchPlan& p) { p.input = "by another path"; }), "");
   EXPECT_THAT(words([](BatchPlan& p) { p.session = "s of yesterday"; }), HasSubstr("another session"));
-  EXPECT_THAT(words([](BatchPlan& p) { p.frames.pop_back(); }), HasSubstr("frames 10:28, each of 2, not 10:26"));
+  EXPECT_THAT(words([](BatchPlan& p) { p.frames.pop_back(); }),
+              HasSubstr("frames 10:28, each of 2, not 10:26"));
   EXPECT_THAT(words([](BatchPlan& p) { p.chunk = 5; }), HasSubstr("chunks of 4 frames, not 5"));
   EXPECT_THAT(words([](BatchPlan& p) { p.options["--effects"] = "auto"; }),
               HasSubstr("--effects was \"none\", and is \"auto\""));

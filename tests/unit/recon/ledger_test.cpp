@@ -131,7 +131,8 @@ class Simulation {
   void expect_every_chunk_to_be_somewhere() const {
     std::set<std::string> found;
     for (const char* where : {"todo", "claims", "given_up", "done"})
-      for (const std::string& name : names_below(folder_ / where)) found.insert(name.substr(0, name.find('.')));
+      for (const std::string& name : names_below(folder_ / where))
+        found.insert(name.substr(0, name.find('.')));
     EXPECT_THAT(found, testing::IsSupersetOf(chunks_));
   }
 

@@ -41,6 +41,7 @@ namespace fs = std::filesystem;
 using recon::BatchPlan;
 using recon::Ledger;
 
+constexpr const char* kGoesOn = "The same command goes on where it ended, on any number of ranks";
 constexpr std::uint64_t kMostFramesOfBatch = 100'000;
 constexpr const char* kTold = "told";      ///< in the ledger, where the report of all is written
 constexpr const char* kOfSlurm = "slurm";  ///< `batch submit` puts it beside the ledger
@@ -82,14 +83,17 @@ class BatchRank {
     }
     const Status worked = work_until_settled();
     const Status told = is_mine_to_tell() ? tell_of_all() : Status();
-    if (!worked) return worked.error();
+    if (!worked) {
+      Error why = worked.error();
+      why.remedy += std::string(why.remedy.empty() ? "" : ". ") + kGoesOn;
+      return why;
+    }
     return Interrupt::asked() && !ledger_->settled() ? Status(ended_early()) : told;
   }
 
  private:
   [[nodiscard]] Error ended_early() const {
-    return {ErrorKind::refused, "ended early, as asked", out_.string(),
-            "The same command goes on where it ended, on any number of ranks"};
+    return {ErrorKind::refused, "ended early, as asked", out_.string(), kGoesOn};
   }
 
   // --- before the work
@@ -255,6 +259,10 @@ class BatchRank {
     if (!ledger_->settled()) return {};
     EMBERLOCK_RETURN_IF_ERROR(write_file_atomically(ledger_->folder() / kTold, ""));
     ledger_->tidy();
+    for (const auto& [name, worker] : recon::workers_in(ledger_->folder() / "workers")) {
+      std::error_code ec;
+      if (pulse_->life_of(name) != recon::Life::alive) fs::remove(ledger_->folder() / "workers" / name, ec);
+    }
     if (told.volumes() == told.planned()) return {};
     return Error{ErrorKind::refused,
                  fmt::format("of {} frames {} failed and {} were given up", told.planned(), told.failed(),

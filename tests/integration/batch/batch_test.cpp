@@ -82,7 +82,7 @@ class Batch : public testing::Test {
       EXPECT_TRUE(fs::exists(out_ / "sequence" / file)) << file;
     EXPECT_THAT(names_in("work"), testing::IsEmpty());
     EXPECT_THAT(names_in("workers"), testing::IsEmpty());
-    const Shell measured = shell(kEmberlock + " export " + out_.string() + " --format nanovdb --out " +
+    const Shell measured = shell(kEmberlock + " export " + out_.string() + " --format nvdb --out " +
                                  (temp_ / "exported").string());
     EXPECT_EQ(measured.status, 0) << measured.output;
   }

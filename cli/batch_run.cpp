@@ -158,10 +158,12 @@ class BatchRank {
       plan.voxels = choice.voxels;
       for (const std::string& words : choice.words) say("voxels", words);
     }
-    fs::create_directories(out_, ec);
+    EMBERLOCK_ASSIGN_OR_RETURN(MadeFolders made, MadeFolders::create(fs::absolute(out_, ec)));
     std::vector<std::string> names;
     for (const recon::Chunk& chunk : recon::chunks_of(plan)) names.push_back(chunk.name);
-    return Ledger::create(ledger_of(out_), me_.name(), to_json(plan), names);
+    EMBERLOCK_RETURN_IF_ERROR(Ledger::create(ledger_of(out_), me_.name(), to_json(plan), names));
+    made.keep();
+    return {};
   }
 
   /// Chunks that were given up, or hold frames that failed.
@@ -224,7 +226,7 @@ class BatchRank {
     Result<report::SequenceTold> told = frames_in_turn(arguments, chunk.frames, watch);
     if (!told && told.error().kind == ErrorKind::bad_input && goes_on) {  // such as by another device
       say("anew", fmt::format("frames {}: {}", chunk.name, told.error().message()));
-      fs::remove_all(claim.work, ec);
+      Ledger::empty(claim);
       told = frames_in_turn(arguments, chunk.frames, watch);
     }
     if (!told) return told.error();

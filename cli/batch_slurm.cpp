@@ -13,6 +13,7 @@
 #include <unistd.h>
 
 #include "base/file.h"
+#include "base/output_folder.h"
 #include "base/unique_fd.h"
 
 namespace emberlock::cli {
@@ -99,9 +100,7 @@ std::string sbatch_script(const SlurmJob& job, const std::vector<std::string>& w
 
 Result<std::string> submit(const std::string& script, const fs::path& out) {
   const fs::path folder = folder_of(out);
-  std::error_code ec;
-  fs::create_directories(folder, ec);
-  if (ec) return Error{ErrorKind::io, "can't be created: " + ec.message(), folder.string()};
+  EMBERLOCK_ASSIGN_OR_RETURN(const MadeFolders made, MadeFolders::create(folder));
   const fs::path file = folder / "batch.sbatch";
   EMBERLOCK_RETURN_IF_ERROR(write_file_atomically(file, script));
   EMBERLOCK_ASSIGN_OR_RETURN(const Ran ran, run_program({"sbatch", "--parsable", file.string()}));

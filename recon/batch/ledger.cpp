@@ -183,6 +183,11 @@ Result<bool> Ledger::finish(const Claim& claim) {
   return moved == Moved::yes;
 }
 
+void Ledger::empty(const Claim& claim) {
+  std::error_code ec;
+  for (const std::string& name : names_in(claim.work)) fs::remove_all(claim.work / name, ec);
+}
+
 Status Ledger::give_back(const Claim& claim) {
   const Result<Moved> kept = move(claim.work, folder_ / "partial" / claim.chunk);
   if (kept && *kept == Moved::occupied) {

@@ -61,6 +61,8 @@ class Ledger {
   /// What is in the work's folder becomes the chunk's result; false where another attempt was finished
   /// before, or the folder was taken away from one taken for dead. Error: io.
   Result<bool> finish(const Claim& claim);
+  /// Removes what an earlier attempt left in the work's folder.
+  static void empty(const Claim& claim);
   /// Whoever takes it next goes on with what is in the work's folder. Error: io.
   Status give_back(const Claim& claim);
   /// Lets a chunk that is done, or given up, be done again, on top of what is there. Not while others finish

@@ -2,6 +2,7 @@
 #include "apply/edit_file.h"
 
 #include <algorithm>
+#include <functional>
 #include <span>
 #include <utility>
 
@@ -45,11 +46,20 @@ std::string hash_of(Fields& fields, const std::string& key) {
   return hash;
 }
 
-ObjectEdit object_of(Fields& fields, const std::filesystem::path& folder) {
+/// Tells an object where its pictures are.
+using FindPictures = std::function<void(Fields&, ObjectEdit&)>;
+
+FindPictures pictures_in(const std::filesystem::path& folder) {
+  return [&folder](Fields& fields, ObjectEdit& object) {
+    object.file = fields.file("file", folder);
+    if (fields.find("mask") != nullptr) object.mask = fields.file("mask", folder);
+  };
+}
+
+ObjectEdit object_of(Fields& fields, const FindPictures& find_pictures) {
   ObjectEdit object;
   object.view = fields.text("view");
-  object.file = fields.file("file", folder);
-  if (fields.find("mask") != nullptr) object.mask = fields.file("mask", folder);
+  find_pictures(fields, object);
   if (fields.find("hash") != nullptr) object.hash = hash_of(fields, "hash");
   object.position = fields.two("position", -kFar, kFar);
   object.scale = fields.number("scale", 1, 1e-3, 1e3);
@@ -109,9 +119,9 @@ ColourEdit colours_of(Fields& fields) {
   return edit;
 }
 
-Operation operation_of(Fields& fields, const std::filesystem::path& folder) {
+Operation operation_of(Fields& fields, const FindPictures& find_pictures) {
   const std::string op = fields.text("op");
-  if (op == "object") return object_of(fields, folder);
+  if (op == "object") return object_of(fields, find_pictures);
   if (op == "brush") return brush_of(fields);
   if (op == "mask") return mask_of(fields);
   if (op == "brightness") return BrightnessEdit{region_of(fields), fields.number("factor", 0, kBrightest)};
@@ -151,7 +161,8 @@ EditFile edits_of(const Json& json, const std::filesystem::path& folder) {
     edits.passes = static_cast<int>(fields.whole("passes", 0, kMostPasses));
   edits.colours = choice_of<Colours>(fields, "colours", kColours);
   each_of(fields.need("steps"), "steps", kMostSteps, [&](Fields& of_step) {
-    Step step{static_cast<int>(of_step.whole("pass", 0, kMostPasses)), operation_of(of_step, folder)};
+    Step step{static_cast<int>(of_step.whole("pass", 0, kMostPasses)),
+              operation_of(of_step, pictures_in(folder))};
     if (!edits.steps.empty() && step.pass < edits.steps.back().pass)
       refuse("goes back", of_step.path("pass"), "Write the steps in their order");
     if (step.pass > edits.passes) refuse("comes after the last pass", of_step.path("pass"));
@@ -244,13 +255,27 @@ std::string hash_camera(const recon::CameraModel& camera) {
 
 constexpr const char* kWrite = "Write edits as apply/edit_file.h describes them";
 
+Result<Operation> parse_alone(std::string_view text, const std::string& where,
+                              const FindPictures& find_pictures) try {
+  EMBERLOCK_RETURN_IF_ERROR(check_json_nesting(text, where));
+  const Json json = Json::parse(text);
+  Fields fields(json, "");
+  Operation operation = operation_of(fields, find_pictures);
+  fields.finish();
+  return operation;
+} catch (const Unreadable& e) {
+  return in_file(e.error, where);
+} catch (const Json::exception& e) {
+  return Error{ErrorKind::bad_input, e.what(), where, kWrite};
+}
+
 }  // namespace
 
 Result<EditFile> parse_edits(std::string_view text, const std::string& where,
                              const std::filesystem::path& folder) try {
   EMBERLOCK_RETURN_IF_ERROR(check_json_nesting(text, where));
   EditFile edits = edits_of(Json::parse(text), folder);
-  if (const auto stands = standing(edits.steps); !stands) return in_file(stands.error(), where);
+  if (const auto history = history_of(edits.steps); !history) return in_file(history.error(), where);
   return edits;
 } catch (const Unreadable& e) {
   return in_file(e.error, where);
@@ -259,17 +284,27 @@ Result<EditFile> parse_edits(std::string_view text, const std::string& where,
 }
 
 Result<Operation> parse_operation(std::string_view text, const std::string& where,
-                                  const std::filesystem::path& folder) try {
-  EMBERLOCK_RETURN_IF_ERROR(check_json_nesting(text, where));
-  const Json json = Json::parse(text);
-  Fields fields(json, "");
-  Operation operation = operation_of(fields, folder);
-  fields.finish();
+                                  const std::filesystem::path& folder) {
+  return parse_alone(text, where, pictures_in(folder));
+}
+
+Result<Operation> parse_foreign_operation(std::string_view text, const std::string& where,
+                                          const std::optional<GivenPictures>& given) {
+  const auto refuse_named = [](Fields& fields, const char* key) {
+    if (fields.find(key) != nullptr)
+      refuse("names a file, which isn't open to you", fields.path(key), "Send the picture itself");
+  };
+  EMBERLOCK_ASSIGN_OR_RETURN(Operation operation,
+                             parse_alone(text, where, [&](Fields& fields, ObjectEdit& object) {
+                               refuse_named(fields, "file");
+                               refuse_named(fields, "mask");
+                               if (!given) refuse("is missing", "picture", "Send the object's picture");
+                               object.file = given->file;
+                               object.mask = given->mask;
+                             }));
+  if (given && !std::holds_alternative<ObjectEdit>(operation))
+    return Error{ErrorKind::bad_input, "is for objects alone", where + ": picture", "Leave it away"};
   return operation;
-} catch (const Unreadable& e) {
-  return in_file(e.error, where);
-} catch (const Json::exception& e) {
-  return Error{ErrorKind::bad_input, e.what(), where, kWrite};
 }
 
 Result<EditFile> read_edits(const std::filesystem::path& file) {
@@ -298,26 +333,25 @@ std::string to_json(const EditFile& edits) {
   return out.dump(1, ' ', false, Out::error_handler_t::replace) + "\n";
 }
 
-Result<std::vector<const Operation*>> standing(const std::vector<Step>& steps) {
-  std::vector<const Operation*> stand;
-  std::vector<const Operation*> undone;
+Result<History> history_of(const std::vector<Step>& steps) {
+  History history;
   for (std::size_t s = 0; s < steps.size(); ++s) {
     const Operation& operation = steps[s].operation;
     const bool undo = std::holds_alternative<Undo>(operation);
     const bool redo = std::holds_alternative<Redo>(operation);
     if (!undo && !redo) {
-      stand.push_back(&operation);
-      undone.clear();
+      history.standing.push_back(&operation);
+      history.undone.clear();
       continue;
     }
-    auto& from = undo ? stand : undone;
+    auto& from = undo ? history.standing : history.undone;
     if (from.empty())
       return Error{ErrorKind::bad_input, undo ? "there is nothing to undo" : "there is nothing to redo",
                    fmt::format("steps[{}]", s), "Leave it away"};
-    (undo ? undone : stand).push_back(from.back());
+    (undo ? history.undone : history.standing).push_back(from.back());
     from.pop_back();
   }
-  return stand;
+  return history;
 }
 
 std::vector<KnownView> known_views(const recon::Scene& scene) {

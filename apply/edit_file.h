@@ -23,32 +23,28 @@ namespace emberlock::apply {
 // Keys that aren't known are errors; paths are relative to the file.
 //
 //   {"format": "emberlock edits", "version": 1,
-//    "scene": [{"view", "width", "height", "picture", "camera"}],  what it was recorded of, both hashes 16
-//    hex
-//                                digits; without it the names of views alone must fit
-//    "voxels": 64,               along the longest edge; without it the program chooses
-//    "passes": 60,               in all
-//    "colours": "flame",         by temperature, or captured
+//    "scene": [{"view", "width", "height",    what it was recorded of, without which the names of views
+//               "picture", "camera"}, ...],   alone must fit; both hashes have 16 hexadecimal digits
+//    "voxels": 64,         along the longest edge; without it the program chooses
+//    "passes": 60,         in all
+//    "colours": "flame",   by temperature, or captured
 //    "steps": [{"pass": 0, "op": "object", ...}, ...]}
 //
 // A step's pass is the number of passes that were done before it took effect; it never falls. Operations:
-//   object      a picture's grey as green light in a view's picture: "view", "file", "position": [x, y] of
-//   its
-//               middle, "scale": 1 pixel of the view for each of its own, "rotation": 0 degrees clockwise,
-//               "strength": 1 by which its grey is multiplied, "opacity": 1, "mask": a picture of the same
-//               size whose grey is opacity too (255: all), "combine": "max", "over" or "add", "hash" of its
-//               pixels
+//   object      a picture's grey as green light in a view's picture: "view", "file",
+//               "position": [x, y] of its middle, "scale": 1 pixel of the view for each of its own,
+//               "rotation": 0 degrees clockwise, "strength": 1 by which its grey is multiplied,
+//               "opacity": 1, "mask": a picture of the same size whose grey is opacity too (255: all),
+//               "combine": "max", "over" or "add", "hash" of its pixels
 //   brush       a stroke in a view's picture: "view", "points": [[x, y], ...], "radius" in pixels, within
-//   which
-//               it fades from half on, "mode": "add" or "subtract" "strength" grey levels of each channel, or
-//               "erase"
-//   mask        a polygon in a view's picture, outside of which (keep) or inside of which (cut) it is black:
-//               "view", "polygon": [[x, y], ...], "part": "keep" or "cut"
+//               which it fades from half on, "mode": "add" or "subtract" "strength" grey levels of each
+//               channel, or "erase"
+//   mask        a polygon in a view's picture, outside of which (keep) or inside of which (cut) it is
+//               black: "view", "polygon": [[x, y], ...], "part": "keep" or "cut"
 //   brightness  of the volume as shown: "region", "factor"
 //   cut, keep   of the volume, which emits nothing inside of a region, or outside: "region"
 //   colour      of the volume as shown, by temperature: "curve": [{"kelvin", "colour": [r, g, b] in any
-//   scale,
-//               "gain": 1}, ...], rising, linear between, and beyond as at its ends
+//               scale, "gain": 1}, ...], rising, linear between, and beyond as at its ends
 //   undo, redo  of the newest step that stands, or was undone
 // A region is {"shape": "box" or "ellipsoid", "center": [x, y, z], "size": [x, y, z], "edge": 0 metres
 // outside over which a brightness fades}.
@@ -146,12 +142,25 @@ Result<EditFile> read_edits(const std::filesystem::path& file);
 /// An operation alone, a step without its pass.
 Result<Operation> parse_operation(std::string_view text, const std::string& where,
                                   const std::filesystem::path& folder);
+/// The pictures of an object that came with it.
+struct GivenPictures {
+  std::filesystem::path file;
+  std::optional<std::filesystem::path> mask = {};
+};
+/// The same of somebody who may name no files: an object's pictures are those given, and a "file" or a "mask"
+/// is refused. Errors too: an object without a picture, or pictures without an object.
+Result<Operation> parse_foreign_operation(std::string_view text, const std::string& where,
+                                          const std::optional<GivenPictures>& given);
 /// What parse_edits() reads back to the bit; paths are written as they are.
 std::string to_json(const EditFile& edits);
 
-/// The operations that stand after all steps, oldest first, none of them undo or redo. Errors: as of
-/// parse_edits().
-Result<std::vector<const Operation*>> standing(const std::vector<Step>& steps);
+/// What has become of steps: their operations, none of them undo or redo.
+struct History {
+  std::vector<const Operation*> standing;  ///< oldest first
+  std::vector<const Operation*> undone;    ///< in the order in which they were undone
+};
+/// Errors: as of parse_edits().
+Result<History> history_of(const std::vector<Step>& steps);
 
 /// What a scene is known by.
 std::vector<KnownView> known_views(const recon::Scene& scene);

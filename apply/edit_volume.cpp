@@ -90,7 +90,7 @@ void brighten(recon::Volume& volume, const BrightnessEdit& edit) {
 }
 
 /// Takes what is dark out of volume and hull: voxels all of whose corners are.
-void take_out(ShownVolume& shown, const std::vector<std::uint8_t>& dark) {
+void take_out(EditedVolume& shown, const std::vector<std::uint8_t>& dark) {
   const recon::Grid& g = shown.volume.grid;
   for (std::size_t p = 0; p < dark.size(); ++p) {
     if (dark[p] == 0) continue;
@@ -166,9 +166,9 @@ void FlameColours::colour(recon::Volume& volume, const std::vector<float>& kelvi
   }
 }
 
-ShownVolume shown_volume(recon::Volume volume, const recon::Hull& hull, const FlameColours& flame,
-                         Colours colours, const std::vector<const Operation*>& operations) {
-  ShownVolume shown{std::move(volume), hull, {}};
+EditedVolume edited_volume(recon::Volume volume, const recon::Hull& hull, const FlameColours& flame,
+                           Colours colours, const std::vector<const Operation*>& operations) {
+  EditedVolume shown{std::move(volume), hull, {}};
   shown.kelvin = flame.kelvin(shown.volume);
   if (colours == Colours::flame) flame.colour(shown.volume, shown.kelvin);
   bool any_dark = false;

@@ -39,7 +39,7 @@ class FlameColours {
 };
 
 /// A volume as it is shown: what is seen of it is render_view()'s with this hull.
-struct ShownVolume {
+struct EditedVolume {
   recon::Volume volume;
   recon::Hull hull;
   std::vector<float> kelvin;  ///< of each key point, before its brightness was edited; 0: not told
@@ -48,7 +48,7 @@ struct ShownVolume {
 /// What colours, brightness and regions make of a volume. Where it was kept dark it neither shines nor
 /// absorbs. A colour by temperature keeps the mean of the channels, but for its gain; a brightness multiplies
 /// all three.
-ShownVolume shown_volume(recon::Volume volume, const recon::Hull& hull, const FlameColours& flame,
-                         Colours colours, const std::vector<const Operation*>& operations);
+EditedVolume edited_volume(recon::Volume volume, const recon::Hull& hull, const FlameColours& flame,
+                           Colours colours, const std::vector<const Operation*>& operations);
 
 }  // namespace emberlock::apply

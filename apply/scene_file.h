@@ -23,19 +23,18 @@ namespace emberlock::apply {
 //                                        --frames`: its frame-N one after the other
 //                "position": [0, 0, 0],  where the result's origin stands
 //                "rotation": [0, 0, 0],  degrees around the world's x, then y, then z
-//                "scale": 1,             its pictures keep their brightness: what it emits and absorbs a
-//                metre
-//                                        is divided by it
+//                "scale": 1,             its pictures keep their brightness: what it emits and absorbs
+//                                        a metre is divided by it
 //                "mirror": "none",       x, y or z: that axis of the result is turned round, before all else
 //                "brightness": 1,        factor of its light
 //                "albedo": 0..1,         of smoke that was filmed in a light (--effects light=...): it takes
-//                the
-//                                        scene's instead, and scatters this share; if not given it keeps that
+//                                        the scene's instead, and scatters this share; if not given it
+//                                        keeps that
 //                "shift": 0,             s: it starts so much later
 //                "rate": 24,             of its frames, a second
 //                "frames": "loop"}],     or once: there is nothing before the first frame and after the last
-//    "geometry": [{"file": PATH,         .gltf or .glb; its y axis becomes the world's z, its z the world's
-//    -y
+//    "geometry": [{"file": PATH,         .gltf or .glb; its y axis becomes the world's z, its z the
+//                                        world's -y
 //                  "position", "rotation", "scale": as above}],
 //    "camera": {"from": [x, y, z], "look_at": [x, y, z]}, or a path through several places:
 //              {"stops": [{"from", "look_at"}, ...]}, or once around:
@@ -43,9 +42,9 @@ namespace emberlock::apply {
 //                         "elevation": 10 degrees}};
 //              in each "field_of_view": 40 degrees of the shorter side, and "up": "z" (x, y, -x, -y, -z)
 //    "light": {"towards": [x, y, z],     the direction to the sun, or "at": a lamp's place
-//              "level": [r, g, b]},      radiance of a white surface that faces it, the lamp's from a metre:
-//              its
-//                                        irradiance / pi. Casts shadows; without this key there is none
+//              "level": [r, g, b]},      radiance of a white surface that faces it, the lamp's from a
+//                                        metre: its irradiance / pi. Casts shadows; without this key
+//                                        there is none
 //    "ambient": [0, 0, 0],               radiance from all sides that lights surfaces and smoke, never shaded
 //    "background": [0, 0, 0]}            what is seen where nothing stands
 

@@ -95,7 +95,7 @@ Result<recon::PreparedScene> Stylization::prepared(const recon::Scene& scene) co
   return prepared;
 }
 
-std::vector<const Operation*> Stylization::stand() const { return standing(steps_).value(); }
+History Stylization::history() const { return history_of(steps_).value(); }
 
 Status Stylization::load(ObjectEdit& object) {
   EMBERLOCK_ASSIGN_OR_RETURN(ObjectPicture picture, load_object(object));
@@ -108,7 +108,7 @@ Status Stylization::apply(Operation operation) {
   EMBERLOCK_RETURN_IF_ERROR(check_view(operation, captured_));
   if (auto* const object = std::get_if<ObjectEdit>(&operation)) EMBERLOCK_RETURN_IF_ERROR(load(*object));
   steps_.push_back({passes_, std::move(operation)});
-  if (const auto all = standing(steps_); !all) {
+  if (const auto all = history_of(steps_); !all) {
     steps_.pop_back();
     return all.error();
   }
@@ -118,7 +118,7 @@ Status Stylization::apply(Operation operation) {
 
 Status Stylization::bring_up() {
   if (!pending_) return {};
-  const std::vector<const Operation*> operations = stand();
+  const std::vector<const Operation*> operations = history().standing;
   bool changed = false;
   for (std::size_t v = 0; v < captured_.views.size(); ++v) {
     const recon::View& captured = captured_.views[v];
@@ -158,11 +158,11 @@ EditFile Stylization::record() const {
   return {known_views(captured_), std::max({grid.nx, grid.ny, grid.nz}) - 1, passes_, colours_, steps_};
 }
 
-ShownVolume Stylization::shown() const {
-  return shown_volume(solve_->volume(), solve_->hull(), flame_, colours_, stand());
+EditedVolume Stylization::shown() const {
+  return edited_volume(solve_->volume(), solve_->hull(), flame_, colours_, history().standing);
 }
 
-recon::RadianceImage Stylization::preview(const ShownVolume& shown, std::size_t view, int widest) const {
+recon::RadianceImage Stylization::preview(const EditedVolume& shown, std::size_t view, int widest) const {
   const recon::View& seen = captured_.views[view];
   const ImageSize size = recon::preview_size(seen.image->size, widest);
   recon::RenderOptions options{.compute = options_.compute};
@@ -191,7 +191,7 @@ Result<recon::Outcome> Stylization::outcome() try {
   report.voxel_choice = begun_.report.voxel_choice;
   report.input = begun_.report.input;
   report.up = begun_.report.up;
-  ShownVolume shown = this->shown();
+  EditedVolume shown = this->shown();
   outcome.renders.clear();
   for (std::size_t v = 0; v < scene.scene().views.size(); ++v)
     outcome.renders.push_back(preview(shown, v, scene.scene().views[v].image->size.width));

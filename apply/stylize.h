@@ -42,14 +42,15 @@ class Stylization {
   [[nodiscard]] int passes() const { return passes_; }
   /// Fitted rays' residual, as the last pass met it; RMS, grey levels.
   [[nodiscard]] double residual() const { return residual_; }
+  [[nodiscard]] History history() const;
   /// Every step so far, with this scene's views, voxels and as many passes as were done.
   [[nodiscard]] EditFile record() const;
   /// With the pictures as edited.
   [[nodiscard]] const recon::Scene& scene() const { return edited_; }
   /// After the last pass, as the operations have it shown.
-  [[nodiscard]] ShownVolume shown() const;
+  [[nodiscard]] EditedVolume shown() const;
   /// The same seen by a view's camera, at most so many pixels wide, in grey levels.
-  [[nodiscard]] recon::RadianceImage preview(const ShownVolume& shown, std::size_t view, int widest) const;
+  [[nodiscard]] recon::RadianceImage preview(const EditedVolume& shown, std::size_t view, int widest) const;
   /// The report tells how the edited pictures are fitted; volume, temperatures and renderings are as shown.
   /// Applies steps of which no pass was done yet.
   Result<recon::Outcome> outcome();
@@ -58,7 +59,6 @@ class Stylization {
   Stylization(const recon::Scene& scene, const recon::Outcome& from, const recon::SolveOptions& options,
               Colours colours, const recon::CameraResponse& response);
   [[nodiscard]] Result<recon::PreparedScene> prepared(const recon::Scene& scene) const;
-  [[nodiscard]] std::vector<const Operation*> stand() const;
   Status load(ObjectEdit& object);
   /// Brings pictures and dark regions to where the steps have them.
   Status bring_up();

@@ -19,13 +19,12 @@
 #include "apply/front_files.h"
 #include "cli/ar_film.h"
 #include "cli/ar_poses.h"
+#include "cli/ar_scene.h"
 #include "cli/commands.h"
 #include "cli/frame_files.h"
 #include "cli/interrupt.h"
 #include "cli/numbers.h"
 #include "cli/outputs.h"
-#include "cli/up_axis.h"
-#include "recon/calibrate/pose.h"
 #include "recon/calibrate/rig_formats.h"
 
 namespace emberlock::cli {
@@ -79,12 +78,7 @@ Result<recon::Intrinsics> lens_of(const ArArguments& a, ImageSize size) {
                    fmt::format("camera {} was calibrated with {} x {} pixels, and the frames have {} x {}",
                                camera.camera_id(), camera.width(), camera.height(), size.width, size.height),
                    a.rig, "Film as it was calibrated, or calibrate it as it films"};
-    v1::Calibration lens = camera.calibration();
-    if (lens.camera_from_world_size() != 12)  // the marker tells the pose
-      for (int i = 0; i < 12; ++i) lens.add_camera_from_world(i % 5 == 0 ? 1 : 0);
-    EMBERLOCK_ASSIGN_OR_RETURN(const recon::CameraModel model,
-                               recon::camera_model_of(lens, size, camera.camera_id(), a.rig));
-    return model.intrinsics;
+    return lens_alone(camera.calibration(), size, camera.camera_id(), a.rig);
   }
   return Error{
       ErrorKind::bad_input,
@@ -103,20 +97,17 @@ Eigen::Matrix3d turned(const std::array<double, 3>& degrees) {
 }
 
 Result<apply::StandingFlame> standing(const ArArguments& a, const apply::Marker& marker) {
-  apply::StandingFlame flame;
   EMBERLOCK_ASSIGN_OR_RETURN(const auto foot, three_of(a.position, "--position", "metres"));
   EMBERLOCK_ASSIGN_OR_RETURN(const auto degrees, three_of(a.rotation, "--rotation", "degrees"));
-  EMBERLOCK_ASSIGN_OR_RETURN(const Eigen::Vector3d up, up_axis(a.up, a.result));
-  flame.placed.result = a.result;
-  flame.placed.world_from_flame.rotation =
-      turned(degrees) * Eigen::Quaterniond::FromTwoVectors(up, Eigen::Vector3d::UnitZ()).toRotationMatrix();
-  flame.placed.world_from_flame.scale = a.scale;
+  EMBERLOCK_ASSIGN_OR_RETURN(apply::StandingFlame flame, upright_on(marker, a.result, a.up));
+  apply::Placement& place = flame.placed.world_from_flame;
+  place.rotation = turned(degrees) * place.rotation;
+  place.scale = a.scale;
   flame.placed.brightness = a.brightness;
   flame.placed.rate = Hertz(a.sequence_rate);
   flame.placed.frames = a.once ? apply::PlacedResult::Frames::once : apply::PlacedResult::Frames::loop;
   flame.foot = {foot[0], foot[1], foot[2]};
-  constexpr double kMarkers = 6;
-  flame.plate = a.plate.value_or(kMarkers * marker.size().maxCoeff());
+  flame.plate = a.plate.value_or(flame.plate);
   return flame;
 }
 

@@ -4,8 +4,6 @@
 #include <algorithm>
 #include <utility>
 
-#include <fmt/format.h>
-
 #include "recon/preprocess/radiance.h"
 #include "session/media/video_scan.h"
 
@@ -56,11 +54,7 @@ Result<Image> ArFilm::next() {
   if (at_ >= times_.size()) return ended();
   EMBERLOCK_ASSIGN_OR_RETURN(Image image, file_->next());
   const ImageSize size = image.layout().size;
-  if (size != size_)
-    return Error{ErrorKind::bad_input,
-                 fmt::format("frame {} has {} x {} pixels, and those before it {} x {}", at_, size.width,
-                             size.height, size_.width, size_.height),
-                 name_, "Cut the video there, or scale all of it to one size"};
+  if (size != size_) return session::size_changed(name_, static_cast<std::int64_t>(at_), size, size_);
   ++at_;
   return as_rgb8(std::move(image));
 }

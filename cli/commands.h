@@ -23,6 +23,10 @@ void add_render(CLI::App& app);
 void add_scene(CLI::App& app);
 void add_stylize(CLI::App& app);
 void add_ar(CLI::App& app);
+/// `marker`: what `ar` looks for, for printing.
+void add_marker(CLI::App& app);
+/// What emberlockd starts for the flame in live pictures; not among the verbs of the help.
+void add_ar_live(CLI::App& app);
 void add_export(CLI::App& app);
 void add_tradeoff(CLI::App& app);
 /// `evaluate paper`.

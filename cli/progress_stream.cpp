@@ -208,7 +208,31 @@ void ProgressStream::done(const recon::Outcome& outcome, const recon::Scene& sce
   add_volume(shown, outcome.reconstruction.volume);
   add_measured(shown, outcome);
   send(last);
+  written(report, folder);
+}
 
+void ProgressStream::stylized(const v1::StylizationStatus& status, const v1::Iteration& iteration,
+                              const recon::RadianceImage& edited, const recon::RadianceImage& rendered,
+                              const recon::Volume* volume) {
+  if (broken_) return;
+  v1::ChildMessage message;
+  v1::IterationPreview& shown = *message.mutable_iteration();
+  *shown.mutable_stylization() = status;
+  *shown.mutable_iteration() = iteration;
+  shown.set_camera_id(status.view());
+  shown.set_captured_jpeg(jpeg(edited));
+  shown.set_rendered_jpeg(jpeg(rendered));
+  if (volume != nullptr) add_volume(shown, *volume);
+  send(message);
+}
+
+void ProgressStream::edited(const v1::ChildMessage::Edited& edited) {
+  v1::ChildMessage message;
+  *message.mutable_edited() = edited;
+  send(message);
+}
+
+void ProgressStream::written(const recon::Report& report, const std::string& folder) {
   v1::ChildMessage message;
   v1::ChildMessage::Done& done = *message.mutable_done();
   for (const recon::EffectReport& effect : report.effects)
@@ -229,6 +253,12 @@ void ProgressStream::done(const recon::Outcome& outcome, const recon::Scene& sce
 void ProgressStream::failed(const Error& error) {
   v1::ChildMessage message;
   message.mutable_failure()->set_message(error.message());
+  send(message);
+}
+
+void ProgressStream::ar_picture(v1::ArPicture picture) {
+  v1::ChildMessage message;
+  *message.mutable_ar_picture() = std::move(picture);
   send(message);
 }
 

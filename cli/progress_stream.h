@@ -14,8 +14,8 @@
 
 namespace emberlock::cli {
 
-/// Reports the progress of a reconstruction to another program, as v1::ChildMessages on a descriptor. When
-/// nobody reads any more, reports are dropped and the work continues.
+/// Reports the progress of a reconstruction, or pictures with a flame, to another program, as
+/// v1::ChildMessages on a descriptor. When nobody reads any more, reports are dropped and the work continues.
 class ProgressStream {
  public:
   /// `fd` stays open and belongs to the caller. From here on this process is killed when its parent dies, and
@@ -30,9 +30,20 @@ class ProgressStream {
   /// the solve's time.
   void iteration(const recon::Preview& preview, const recon::Scene& scene,
                  const recon::ComputeOptions& compute);
+  /// What a stylization shows: the picture of `status.view` as edited, the volume as that view sees it, and,
+  /// if it is given, the volume.
+  void stylized(const v1::StylizationStatus& status, const v1::Iteration& iteration,
+                const recon::RadianceImage& edited, const recon::RadianceImage& rendered,
+                const recon::Volume* volume);
+  void edited(const v1::ChildMessage::Edited& edited);
   /// With temperatures and errors as far as the outcome has them.
   void done(const recon::Outcome& outcome, const recon::Scene& scene, const std::string& folder);
+  /// done() without its pictures.
+  void written(const recon::Report& report, const std::string& folder);
   void failed(const Error& error);
+  void ar_picture(v1::ArPicture picture);
+  /// Nobody reads any more.
+  [[nodiscard]] bool broken() const { return broken_; }
 
  private:
   using Clock = std::chrono::steady_clock;

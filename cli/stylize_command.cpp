@@ -2,9 +2,12 @@
 #include <algorithm>
 #include <cstdio>
 #include <filesystem>
+#include <functional>
 #include <memory>
 #include <optional>
+#include <set>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -19,7 +22,9 @@
 #include "cli/interrupt.h"
 #include "cli/line_reader.h"
 #include "cli/outputs.h"
+#include "cli/progress_stream.h"
 #include "cli/reconstruct_arguments.h"
+#include "cli/stylize_stream.h"
 #include "recon/export/picture.h"
 #include "recon/preprocess/radiance.h"
 #include "report/reconstruct_report.h"
@@ -40,6 +45,7 @@ struct StylizeArguments {
 };
 
 constexpr int kPassesAfterAnEdit = 60;
+constexpr const char* kObjects = "objects";  // of a result
 
 /// A run of a stylization: its steps from a file, or live, and what is shown of it.
 class StylizeRun {
@@ -125,15 +131,20 @@ class StylizeRun {
   std::optional<LineReader> lines_;
 };
 
-/// Copies the objects' pictures into the result, and has the steps name them there.
+/// Copies the objects' pictures into the result, unless they are there, and has the steps name them there.
 Status keep_objects(apply::EditFile& edits, const fs::path& folder) {
+  std::error_code ec;
+  std::set<fs::path> kept;
   const auto keep = [&](fs::path& file, const std::string& hash, const char* what) -> Status {
-    const fs::path name = fs::path("objects") / (hash + what + file.extension().string());
-    std::error_code ec;
-    fs::create_directories(folder / "objects", ec);
-    fs::copy_file(file, folder / name, fs::copy_options::overwrite_existing, ec);
-    if (ec) return Error{ErrorKind::io, "can't be copied: " + ec.message(), file.string()};
-    file = name;
+    const bool there = file.parent_path() == folder / kObjects;
+    const fs::path name = there ? file.filename() : fs::path(hash + what + file.extension().string());
+    if (!there) {
+      fs::create_directories(folder / kObjects, ec);
+      fs::copy_file(file, folder / kObjects / name, fs::copy_options::overwrite_existing, ec);
+      if (ec) return Error{ErrorKind::io, "can't be copied: " + ec.message(), file.string()};
+    }
+    file = fs::path(kObjects) / name;
+    kept.insert(folder / file);
     return {};
   };
   for (apply::Step& step : edits.steps) {
@@ -142,6 +153,10 @@ Status keep_objects(apply::EditFile& edits, const fs::path& folder) {
     EMBERLOCK_RETURN_IF_ERROR(keep(object->file, object->hash, ""));
     if (object->mask) EMBERLOCK_RETURN_IF_ERROR(keep(*object->mask, object->hash, "-mask"));
   }
+  // Those of steps that were refused.
+  for (const fs::directory_entry& entry : fs::directory_iterator(folder / kObjects, ec))
+    if (!kept.contains(entry.path())) fs::remove(entry.path(), ec);
+  if (kept.empty()) fs::remove(folder / kObjects, ec);
   return {};
 }
 
@@ -195,8 +210,8 @@ Status write_edited(const recon::Scene& captured, const recon::Scene& edited, co
   return {};
 }
 
-Status write(const StylizeArguments& a, const recon::Scene& captured, apply::Stylization& stylization,
-             OutputFolder& folder) {
+Result<recon::Report> write(const StylizeArguments& a, const recon::Scene& captured,
+                            apply::Stylization& stylization, OutputFolder& folder) {
   EMBERLOCK_ASSIGN_OR_RETURN(recon::Outcome outcome, stylization.outcome());
   std::optional<recon::TemperatureField> temperature;
   temperature.swap(outcome.temperature);  // whose errors the page would tell
@@ -214,33 +229,70 @@ Status write(const StylizeArguments& a, const recon::Scene& captured, apply::Sty
   std::fprintf(to, "%-16s %.2f %.2f %.2f grey levels (R, G, B), of the edited pictures\n", "input views",
                rmse[0], rmse[1], rmse[2]);
   std::fprintf(to, "%-16s %s\n", "written to", a.out.c_str());
-  return {};
+  return std::move(outcome.report);
 }
 
-Status stylize(const StylizeArguments& a) {
+/// Goes on behind `from`, by a file, by lines, or as another program says on stdin, which is told on
+/// `stream`.
+Status edit(const StylizeArguments& a, const apply::EditFile& edits, const recon::Scene& scene,
+            const recon::Report& from, apply::Stylization& stylization, const fs::path& folder,
+            ProgressStream* stream) {
+  std::error_code ec;
+  if (stream != nullptr) {
+    fs::create_directories(folder / kObjects, ec);
+    const recon::TracePoint last = from.trace.empty() ? recon::TracePoint() : from.trace.back();
+    return StylizeStream(stylization, scene, last, a.passes.value_or(kPassesAfterAnEdit), folder / kObjects,
+                         *stream)
+        .run(STDIN_FILENO);
+  }
+  EMBERLOCK_ASSIGN_OR_RETURN(const std::size_t view, view_shown(a, edits, scene));
+  if (a.previews) fs::create_directory(folder / "previews", ec);
+  return StylizeRun(a, edits, stylization, folder, view).go();
+}
+
+/// `stream`: of the program that asks; null: none does.
+Status stylize(const StylizeArguments& a, ProgressStream* stream) {
   EMBERLOCK_ASSIGN_OR_RETURN(const apply::EditFile edits, edits_asked_for(a));
   EMBERLOCK_ASSIGN_OR_RETURN(recon::ReconstructOptions options, options_with(a, edits));
   OutputRequest request{a.out, kStylize, inputs_of(a.reconstruct)};
   if (!a.edits.empty()) request.inputs.emplace_back(a.edits);
   EMBERLOCK_RETURN_IF_ERROR(OutputFolder::check(request));
-  const Progress bar = progress_bar("reconstruct");
+  Progress bar = progress_bar("reconstruct");
+  if (stream != nullptr) {
+    EMBERLOCK_ASSIGN_OR_RETURN(const recon::Device device, recon::resolve(options.solve.compute.device));
+    stream->loading(device);
+    bar = [stream](double fraction, std::string_view doing) { stream->progress(fraction, doing); };
+  }
   EMBERLOCK_ASSIGN_OR_RETURN(const recon::Scene scene, load_views(a.reconstruct, bar));
   EMBERLOCK_RETURN_IF_ERROR(apply::check_edits(edits, scene, a.edits));
-  EMBERLOCK_ASSIGN_OR_RETURN(const std::size_t view, view_shown(a, edits, scene));
+  if (stream == nullptr) EMBERLOCK_RETURN_IF_ERROR(view_shown(a, edits, scene));
   const Interrupt interrupt;
   options.solve.stop = Interrupt::asked;
   const SteadyClock clock;
-  EMBERLOCK_ASSIGN_OR_RETURN(recon::Outcome begun, recon::reconstruct(scene, options, clock, bar));
+  std::function<void(const recon::Preview&)> preview;
+  if (stream != nullptr)
+    preview = [&](const recon::Preview& state) { stream->iteration(state, scene, options.solve.compute); };
+  EMBERLOCK_ASSIGN_OR_RETURN(recon::Outcome begun, recon::reconstruct(scene, options, clock, bar, preview));
   begun.report.input = a.reconstruct.input;
   begun.report.up = report::shown_axes(scene.views).up_axis();
   EMBERLOCK_ASSIGN_OR_RETURN(
       const std::unique_ptr<apply::Stylization> stylization,
       apply::Stylization::begin(scene, begun, options.solve, edits.colours, recon::response_for({}, scene)));
   EMBERLOCK_ASSIGN_OR_RETURN(OutputFolder folder, OutputFolder::create(request));
-  std::error_code ec;
-  if (a.previews) fs::create_directory(folder.path() / "previews", ec);
-  EMBERLOCK_RETURN_IF_ERROR(StylizeRun(a, edits, *stylization, folder.path(), view).go());
-  return write(a, scene, *stylization, folder);
+  EMBERLOCK_RETURN_IF_ERROR(edit(a, edits, scene, begun.report, *stylization, folder.path(), stream));
+  if (stream != nullptr) stream->progress(1, "writing the result");
+  EMBERLOCK_ASSIGN_OR_RETURN(const recon::Report report, write(a, scene, *stylization, folder));
+  if (stream != nullptr) stream->written(report, a.out);
+  return {};
+}
+
+void stylize_command(const StylizeArguments& a) {
+  if (!a.reconstruct.progress_fd) return or_fail(stylize(a, nullptr));
+  ProgressStream stream = or_fail(ProgressStream::open(*a.reconstruct.progress_fd));
+  const Status done = stylize(a, &stream);
+  if (done.ok()) return;
+  stream.failed(done.error());
+  fail(done.error());
 }
 
 }  // namespace
@@ -269,6 +321,13 @@ void add_stylize(CLI::App& app) {
                    "file's, or flame]")
       ->check(CLI::IsMember({"flame", "captured"}));
   verb->add_flag("--previews", a.previews, "A picture after every pass, OUT/previews/0001.png and so on");
+  verb->add_option("--progress-fd", a.reconstruct.progress_fd,
+                   "For programs: take steps from stdin and tell of everything on this descriptor "
+                   "(emberlock/v1/child.proto); end when the parent ends")
+      ->check(CLI::NonNegativeNumber)
+      ->excludes("--edits")
+      ->excludes("--live")
+      ->excludes("--previews");
   verb->add_option("--view", a.view, "The view that previews show [the first that is edited]");
   verb->add_option("--rig", a.reconstruct.rig, "Sessions only: rig.json of `calibrate cameras`");
   verb->add_option("--box", a.reconstruct.box, "cx,cy,cz,sx,sy,sz: the volume's centre and size in metres");
@@ -280,7 +339,7 @@ void add_stylize(CLI::App& app) {
   verb->callback([arguments] {
     if (arguments->reconstruct.last_frame)
       fail({ErrorKind::bad_input, "one frame is edited at a time", "--frames", "Give --frame"});
-    or_fail(stylize(*arguments));
+    stylize_command(*arguments);
   });
 }
 

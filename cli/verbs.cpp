@@ -28,6 +28,8 @@ int main(int argc, char** argv) {
   emberlock::cli::add_scene(app);
   emberlock::cli::add_stylize(app);
   emberlock::cli::add_ar(app);
+  emberlock::cli::add_ar_live(app);
+  emberlock::cli::add_marker(app);
   emberlock::cli::add_export(app);
   emberlock::cli::add_measure(app);
   emberlock::cli::add_verify(app);

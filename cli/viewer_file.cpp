@@ -94,13 +94,13 @@ json told_view(const json& told, std::size_t n) {
 }
 
 /// The cameras that filmed a volume, and what each saw of it.
-struct Filmed {
+struct FilmedViews {
   std::vector<report::ViewerCamera> cameras;
   std::vector<report::ViewerView> views;
 };
 
-Result<Filmed> filmed(const ResultVolume& volume, const recon::Grid& grid, const ViewerOptions& options,
-                      ImageSize within) {
+Result<FilmedViews> filmed(const ResultVolume& volume, const recon::Grid& grid, const ViewerOptions& options,
+                           ImageSize within) {
   const fs::path folder = volume.file.parent_path();
   const std::string input = options.input.empty() ? reported(folder, "input") : options.input;
   if (input.empty())
@@ -112,7 +112,7 @@ Result<Filmed> filmed(const ResultVolume& volume, const recon::Grid& grid, const
   if (!options.rig.empty()) scene_options.rig = options.rig;
   EMBERLOCK_ASSIGN_OR_RETURN(const recon::Scene scene, recon::load_scene(input, scene_options));
   const json told = report_of(folder);
-  Filmed all;
+  FilmedViews all;
   for (std::size_t n = 0; n < scene.views.size(); ++n) {
     const recon::View& view = scene.views[n];
     const json about = told_view(told, n);
@@ -157,7 +157,7 @@ Result<std::string> viewer_html(const fs::path& result, const std::vector<Result
     tell(bar, static_cast<double>(n) / static_cast<double>(volumes.size()), volumes[n].file.string());
     EMBERLOCK_ASSIGN_OR_RETURN(recon::SharedVolume volume, recon::read_shared_volume(volumes[n].file));
     volume.provenance.frame = volumes[n].frame;
-    Result<Filmed> seen = filmed(volumes[n], volume.grid, options, within);
+    Result<FilmedViews> seen = filmed(volumes[n], volume.grid, options, within);
     if (!seen && !amiss) amiss = seen.error();
     if (seen && cameras.empty()) cameras = std::move(seen->cameras);
     const bool fits = seen && seen->views.size() == cameras.size();

@@ -36,9 +36,14 @@ class Api {
   virtual Status cancel_job(const v1::CancelJobRequest& request) = 0;
   virtual Result<v1::ReconstructionStatus> reconstruct(const v1::ReconstructRequest& request) = 0;
   virtual Result<v1::ReconstructionStatus> cancel_reconstruction() = 0;
+  virtual Result<v1::StylizationStatus> edit_reconstruction(const v1::EditRequest& request) = 0;
+  virtual Result<v1::ReconstructionStatus> finish_reconstruction() = 0;
   /// Null: the frame isn't done, or no longer held.
   virtual std::shared_ptr<const v1::IterationPreview> reconstructed_frame(
       const v1::FrameRequest& request) = 0;
+  virtual Result<v1::ListResultsResponse> list_results() = 0;
+  virtual Result<v1::ArStatus> start_ar(const v1::ArRequest& request) = 0;
+  virtual Result<v1::ArStatus> stop_ar() = 0;
 };
 
 }  // namespace emberlock::daemon

@@ -36,20 +36,21 @@ Result<std::optional<Prefix>> read_prefix(std::string_view bytes) {
 
 }  // namespace
 
-std::string framed(const v1::ChildMessage& message) {
+std::string framed(const google::protobuf::MessageLite& message) {
   std::ostringstream out;
   google::protobuf::util::SerializeDelimitedToOstream(message, &out);
   return std::move(out).str();
 }
 
-Status ChildMessageParser::add(std::string_view bytes, const std::function<void(v1::ChildMessage&&)>& take) {
+template <class Message>
+Status MessageParser<Message>::add(std::string_view bytes, const std::function<void(Message&&)>& take) {
   held_.append(bytes);
   std::size_t done = 0;
   for (;;) {
     const std::string_view rest = std::string_view(held_).substr(done);
     EMBERLOCK_ASSIGN_OR_RETURN(const std::optional<Prefix> prefix, read_prefix(rest));
     if (!prefix || rest.size() - prefix->bytes < prefix->length) break;
-    v1::ChildMessage message;
+    Message message;
     if (!message.ParseFromArray(rest.data() + prefix->bytes, static_cast<int>(prefix->length)))
       return Error{ErrorKind::bad_input, "bytes that are no message"};
     take(std::move(message));
@@ -58,5 +59,8 @@ Status ChildMessageParser::add(std::string_view bytes, const std::function<void(
   held_.erase(0, done);
   return {};
 }
+
+template class MessageParser<v1::ChildMessage>;
+template class MessageParser<v1::EditRequest>;
 
 }  // namespace emberlock::session

@@ -42,6 +42,15 @@ ReconstructionOptions reconstruction_options(const rig::DaemonConfig& config) {
   return options;
 }
 
+LiveArOptions ar_options(const ReconstructionOptions& reconstruction) {
+  LiveArOptions options;
+  options.program = reconstruction.program;
+  options.results = reconstruction.results;
+  options.threads = reconstruction.threads;
+  options.niceness = reconstruction.niceness;
+  return options;
+}
+
 }  // namespace
 
 Result<std::unique_ptr<Engine>> Engine::start(const rig::DaemonConfig& config, Board& board, OnFrame on_frame,
@@ -51,9 +60,10 @@ Result<std::unique_ptr<Engine>> Engine::start(const rig::DaemonConfig& config, B
       session::SessionStore::open(config.recording.folder,
                                   {.min_free_bytes = config.recording.writer.min_free_bytes}));
   const auto ids = std::make_shared<std::vector<std::string>>();  // complete before the first frame
+  const auto ar = std::make_shared<LiveAr>(ar_options(reconstruction_options(config)), board);
   if (on_frame) {
-    rig_options.on_frame = [ids, show = std::move(on_frame)](std::size_t camera, const Frame& frame) {
-      show((*ids)[camera], frame);
+    rig_options.on_frame = [ids, ar, show = std::move(on_frame)](std::size_t camera, const Frame& frame) {
+      if (const std::string& id = (*ids)[camera]; !ar->offer(id, frame)) show(id, frame);
     };
   }
   EMBERLOCK_ASSIGN_OR_RETURN(std::unique_ptr<rig::Rig> rig,
@@ -61,19 +71,20 @@ Result<std::unique_ptr<Engine>> Engine::start(const rig::DaemonConfig& config, B
   for (std::size_t i = 0; i < rig->size(); ++i) ids->push_back(rig->camera(i).info().id);
   EMBERLOCK_ASSIGN_OR_RETURN(rig::Geometry geometry, rig::Geometry::of(config.rig, *rig));
   std::unique_ptr<Engine> engine(
-      new Engine(config, board, std::move(store), std::move(rig), std::move(geometry)));
+      new Engine(config, board, std::move(store), std::move(rig), std::move(geometry), ar));
   engine->take_up_work();
   return engine;
 }
 
 Engine::Engine(const rig::DaemonConfig& config, Board& board, session::SessionStore store,
-               std::unique_ptr<rig::Rig> rig, rig::Geometry geometry)
+               std::unique_ptr<rig::Rig> rig, rig::Geometry geometry, std::shared_ptr<LiveAr> ar)
     : config_(config),
       board_(board),
       store_(std::move(store)),
       rig_(std::move(rig)),
       geometry_(std::move(geometry)),
       reconstruction_(reconstruction_options(config), board, jobs_),
+      ar_(std::move(ar)),
       thread_([this] { run(); }) {}
 
 void Engine::take_up_work() { take_up(store_, jobs_, config_.recording.transcode, told()); }
@@ -98,6 +109,7 @@ void Engine::end() {
   ending_ = true;
   jobs_.end();
   reconstruction_.end();
+  ar_->end();
   asked_.notify_all();
 }
 
@@ -162,7 +174,8 @@ void Engine::refuse_calls() {
 }
 
 void Engine::show(const Conductor& conductor) {
-  const v1::DaemonStatus status = conductor.status();
+  v1::DaemonStatus status = conductor.status();
+  if (const auto ar = ar_->status()) *status.mutable_ar() = *ar;
   phase_ = status.phase();
   board_.show(status);
   shown_.notify_all();
@@ -332,6 +345,22 @@ Result<v1::ReconstructionStatus> Engine::cancel_reconstruction() {
                                                        EMBERLOCK_RETURN_IF_ERROR(c.cancel_reconstruction());
                                                        return c.status().reconstruction();
                                                      });
+}
+
+Result<v1::StylizationStatus> Engine::edit_reconstruction(const v1::EditRequest& request) {
+  return reconstruction_.edit(request);
+}
+
+Result<v1::ReconstructionStatus> Engine::finish_reconstruction() { return reconstruction_.finish(); }
+
+Result<v1::ArStatus> Engine::start_ar(const v1::ArRequest& request) {
+  for (std::size_t i = 0; i < rig_->size(); ++i) {
+    const drivers::CameraInfo& info = rig_->camera(i).info();
+    if (info.id == request.camera_id())
+      return ar_->start(request, {info.id, info.layout, geometry_.calibration_of(info.id)});
+  }
+  return Error{ErrorKind::bad_input, "the rig has no such camera", request.camera_id(),
+               "Name one of the status' cameras"};
 }
 
 std::shared_ptr<const v1::IterationPreview> Engine::reconstructed_frame(const v1::FrameRequest& request) {

@@ -13,6 +13,7 @@
 
 #include "base/result.h"
 #include "daemon/api.h"
+#include "daemon/ar/live_ar.h"
 #include "daemon/engine/conductor.h"
 #include "daemon/work/jobs.h"
 #include "daemon/work/upkeep.h"
@@ -23,7 +24,8 @@ namespace emberlock::daemon {
 /// what clients ask of it. Any thread may call the Api.
 class Engine final : public Api {
  public:
-  /// Sees every frame, by its camera's id, on that camera's thread: it must return at once.
+  /// Sees every frame that no flame is put into, by its camera's id, on that camera's thread: it must return
+  /// at once.
   using OnFrame = std::function<void(const std::string& camera_id, const Frame& frame)>;
 
   /// Opens the sessions' folder and the rig, which takes no second. What a killed recorder left is salvaged
@@ -67,7 +69,12 @@ class Engine final : public Api {
   Status cancel_job(const v1::CancelJobRequest& request) override;
   Result<v1::ReconstructionStatus> reconstruct(const v1::ReconstructRequest& request) override;
   Result<v1::ReconstructionStatus> cancel_reconstruction() override;
+  Result<v1::StylizationStatus> edit_reconstruction(const v1::EditRequest& request) override;
+  Result<v1::ReconstructionStatus> finish_reconstruction() override;
   std::shared_ptr<const v1::IterationPreview> reconstructed_frame(const v1::FrameRequest& request) override;
+  Result<v1::ListResultsResponse> list_results() override { return ar_->results(); }
+  Result<v1::ArStatus> start_ar(const v1::ArRequest& request) override;
+  Result<v1::ArStatus> stop_ar() override { return ar_->stop(); }
 
  private:
   enum class Urgency {
@@ -76,7 +83,7 @@ class Engine final : public Api {
   };
 
   Engine(const rig::DaemonConfig& config, Board& board, session::SessionStore store,
-         std::unique_ptr<rig::Rig> rig, rig::Geometry geometry);
+         std::unique_ptr<rig::Rig> rig, rig::Geometry geometry, std::shared_ptr<LiveAr> ar);
   void take_up_work();
   [[nodiscard]] UpkeepTold told();
   /// Refused while it is salvaged.
@@ -95,6 +102,7 @@ class Engine final : public Api {
   std::unique_ptr<rig::Rig> rig_;
   rig::Geometry geometry_;
   ReconstructionChild reconstruction_;
+  std::shared_ptr<LiveAr> ar_;  ///< the cameras' threads have it too
 
   std::mutex mutex_;
   std::condition_variable asked_;

@@ -2,7 +2,6 @@
 #include "daemon/reconstruction/child.h"
 
 #include <algorithm>
-#include <cerrno>
 #include <chrono>
 #include <cmath>
 #include <csignal>
@@ -17,12 +16,9 @@
 #include <unistd.h>
 
 #include "base/clock.h"
+#include "daemon/reconstruction/child_output.h"
 #include "daemon/reconstruction/process.h"
-#include "recon/calibrate/camera_response.h"
-#include "recon/calibrate/rig.h"
-#include "recon/compute/device.h"
-#include "recon/temperature/emitter.h"
-#include "recon/temperature/line_emitter.h"
+#include "daemon/reconstruction/request.h"
 #include "session/child_messages.h"
 #include "session/files.h"
 #include "session/frame_range.h"
@@ -35,7 +31,6 @@ namespace {
 using Steady = std::chrono::steady_clock;
 
 constexpr auto kUnknown = std::numeric_limits<std::uint64_t>::max();  // a number of frames
-constexpr std::uint32_t kLargestVoxels = 1024;  // as `emberlock reconstruct --voxels` takes them
 
 Steady::duration duration(Seconds seconds) {
   return std::chrono::duration_cast<Steady::duration>(std::chrono::duration<double>(seconds.value()));
@@ -45,108 +40,19 @@ std::int64_t now_ns() {
   return std::chrono::duration_cast<std::chrono::nanoseconds>(Steady::now().time_since_epoch()).count();
 }
 
-Error refuse_field(const char* field, std::string what, std::string remedy) {
-  return {ErrorKind::bad_input, std::move(what), field, std::move(remedy)};
-}
-
-Status check_quantity(const v1::ReconstructRequest& request) {
-  const bool temperature = request.quantity() == "temperature";
-  if (!temperature && !request.quantity().empty() && request.quantity() != "colour")
-    return refuse_field("quantity", fmt::format("\"{}\" is none", request.quantity()),
-                        "Give colour or temperature");
-  if (!request.emitter().empty()) {
-    if (const auto emitter = recon::parse_emitter(request.emitter()); !emitter)
-      return refuse_field("emitter", emitter.error().what, emitter.error().remedy);
-    if (!temperature) return refuse_field("emitter", "is for temperatures", "Give quantity temperature too");
-  }
-  recon::CameraResponse response = recon::standard_response();
-  if (request.has_response()) {
-    if (!temperature) return refuse_field("response", "is for temperatures", "Give quantity temperature too");
-    EMBERLOCK_ASSIGN_OR_RETURN(response, recon::camera_response_of(request.response(), "response"));
-  }
-  if (request.lines().empty()) return {};
-  if (!temperature) return refuse_field("lines", "is for temperatures", "Give quantity temperature too");
-  const auto lines = recon::parse_lines(request.lines());
-  if (!lines) return refuse_field("lines", lines.error().what, lines.error().remedy);
-  const bool paper = request.emitter() == recon::name(recon::Emitter::paper);
-  if (!request.has_response() && !paper) return {};  // the session's response is read with it
-  const Status told =
-      recon::check_lines(response, paper ? recon::Emitter::paper : recon::Emitter::grey, *lines);
-  return told.ok() ? Status() : refuse_field("lines", told.error().what, told.error().remedy);
-}
-
-Status check_request(const v1::ReconstructRequest& request) {
-  if (!std::isfinite(request.budget_s()) || request.budget_s() < 0)
-    return refuse_field("budget_s", "is no length of time", "Give seconds above 0, or 0 for none");
-  if (request.voxels() > kLargestVoxels)
-    return refuse_field(
-        "voxels", fmt::format("{} are too many", request.voxels()),
-        fmt::format("Give at most {}, or 0 for the knee of time against error", kLargestVoxels));
-  EMBERLOCK_RETURN_IF_ERROR(check_quantity(request));
-  if (!request.device().empty()) {
-    if (const auto device = recon::parse_device(request.device()); !device) return device.error();
-  }
-  return {};
-}
-
-/// What the child reads on its stdin: its --response.
-std::string input_for(const v1::ReconstructRequest& request) {
-  if (!request.has_response()) return {};
-  const auto response = recon::camera_response_of(request.response(), "response");
-  return response ? recon::to_json(*response) : std::string();
-}
-
-/// What a child wrote to stderr, as far as a sentence can hold it.
-class LastWords {
- public:
-  void add(std::string_view bytes) {
-    held_.append(bytes);
-    if (held_.size() > kMost) held_.erase(0, held_.size() - kMost);
-  }
-  /// Its last lines, in printable ASCII.
-  [[nodiscard]] std::string text() const {
-    std::vector<std::string> lines(1);
-    for (const char c : held_) {
-      if (c == '\n' || c == '\r') {
-        if (!lines.back().empty()) lines.emplace_back();
-      } else {
-        lines.back() += c >= ' ' && c <= '~' ? c : '?';
-      }
-    }
-    if (lines.back().empty()) lines.pop_back();
-    if (lines.size() > kLines) lines.erase(lines.begin(), lines.end() - static_cast<std::ptrdiff_t>(kLines));
-    return fmt::format("{}", fmt::join(lines, " / "));
-  }
-
- private:
-  static constexpr std::size_t kMost = 2000;  // bytes
-  static constexpr std::size_t kLines = 4;
-  std::string held_;
-};
-
 constexpr int kLook = 100;  // ms, between two looks whether it shall end
 
-enum class ReadEnd { open, closed };
-
-using TakeBytes = std::function<void(std::string_view)>;
-
-/// Gives `take` what is there now; at most 1 MiB, so that nobody is kept from the rest.
-ReadEnd read_all(int fd, const TakeBytes& take) {
-  char bytes[65536];
-  for (int i = 0; i < 16; ++i) {
-    const ssize_t n = ::read(fd, bytes, sizeof bytes);
-    if (n > 0) {
-      take({bytes, static_cast<std::size_t>(n)});
-    } else if (n == 0 || (errno != EINTR && errno != EAGAIN)) {
-      return ReadEnd::closed;
-    } else if (errno == EAGAIN) {
-      return ReadEnd::open;
-    }
-  }
-  return ReadEnd::open;
-}
-
 }  // namespace
+
+fs::path ReconstructionChild::result_of(const v1::ReconstructRequest& request) const {
+  const std::string frame = request.has_frame() ? fmt::format("frame-{}", request.frame()) : "middle-frame";
+  const fs::path folder = fs::absolute(options_.results / request.session());
+  if (!request.stylize()) return folder / frame;
+  std::error_code ec;
+  fs::path result = folder / (frame + "-stylized");
+  for (int n = 2; fs::exists(result, ec); ++n) result = folder / fmt::format("{}-stylized-{}", frame, n);
+  return result;
+}
 
 Status ReconstructionChild::check(const v1::ReconstructRequest& request) const {
   EMBERLOCK_RETURN_IF_ERROR(check_request(request));
@@ -179,17 +85,17 @@ std::vector<std::string> ReconstructionChild::command_for(const v1::ReconstructR
   const double budget = request.budget_s() > 0 ? request.budget_s() : unasked.budget_s();
   const std::uint32_t voxels = request.voxels() > 0 ? request.voxels() : unasked.voxels();
   const auto& hold_out = request.hold_out().empty() ? unasked.hold_out() : request.hold_out();
-  const std::string frame = request.has_frame() ? fmt::format("frame-{}", request.frame()) : "middle-frame";
-  std::vector<std::string> command = {options_.program.string(), "reconstruct",
+  std::vector<std::string> command = {options_.program.string(),
+                                      request.stylize() ? "stylize" : "reconstruct",
                                       fs::absolute(options_.sessions / request.session()).string()};
   const auto option = [&](const char* name, std::string value) {
     command.insert(command.end(), {name, std::move(value)});
   };
-  option("--out", fs::absolute(options_.results / request.session() / frame).string());
+  option("--out", result_of(request).string());
   option("--progress-fd", std::to_string(ChildProcess::kMessagesFd));
   if (!device.empty()) option("--device", device);
   if (request.has_frame()) option("--frame", std::to_string(request.frame()));
-  if (budget > 0) option("--budget", fmt::format("{}", budget));
+  if (budget > 0 && !request.stylize()) option("--budget", fmt::format("{}", budget));
   if (voxels > 0) option("--voxels", std::to_string(voxels));
   if (!hold_out.empty()) option("--hold-out", fmt::format("{}", fmt::join(hold_out, ",")));
   if (!request.quantity().empty()) option("--quantity", request.quantity());
@@ -229,7 +135,30 @@ Result<v1::ReconstructionStatus> ReconstructionChild::start(const v1::Reconstruc
     begun_ns_ = now_ns();
     cancelling_ = false;
     running_ = true;
+    stylizes_ = request.stylize();
   }
+  return *status();
+}
+
+Status ReconstructionChild::check_editable() const {
+  const std::lock_guard lock(mutex_);
+  if (!runs() || !stylizes_)
+    return Error{ErrorKind::refused, "none runs", "stylization", "Start one of a session's frame"};
+  if (!state_->status().has_stylization())
+    return Error{ErrorKind::refused, "its flame isn't reconstructed yet", "stylization",
+                 "Wait for its first preview"};
+  return {};
+}
+
+Result<v1::StylizationStatus> ReconstructionChild::edit(const v1::EditRequest& request) {
+  constexpr Seconds kLongest{60};
+  EMBERLOCK_RETURN_IF_ERROR(check_editable());
+  return edits_.ask(request, kLongest);
+}
+
+Result<v1::ReconstructionStatus> ReconstructionChild::finish() {
+  EMBERLOCK_RETURN_IF_ERROR(check_editable());
+  EMBERLOCK_RETURN_IF_ERROR(edits_.finish());
   return *status();
 }
 
@@ -291,18 +220,25 @@ JobResult ReconstructionChild::supervise(v1::ReconstructRequest request, const O
   return outcome;
 }
 
+Result<ChildProcess> ReconstructionChild::spawn(const v1::ReconstructRequest& request) {
+  if (!request.stylize())
+    return ChildProcess::spawn(command_for(request), options_.niceness, input_for(request));
+  EMBERLOCK_ASSIGN_OR_RETURN(const UniqueFd steps, edits_.open());
+  return ChildProcess::spawn(command_for(request), options_.niceness, steps);
+}
+
 void ReconstructionChild::reconstruct(const v1::ReconstructRequest& request, const Observer& observer) {
   LastWords last_words;
   ChildEnd end;
   // The child dies with the thread that started it, as the kernel counts parents: this one, which watches it.
-  if (auto process = ChildProcess::spawn(command_for(request), options_.niceness, input_for(request));
-      process.ok()) {
+  if (auto process = spawn(request); process.ok()) {
     end = watch(
         *process, [&](std::string_view bytes) { last_words.add(bytes); }, observer);
   } else {
     end.why = ChildEnd::Why::not_started;
     end.words = process.error().message();
   }
+  edits_.close();
   const std::lock_guard lock(mutex_);
   state_->end(end, last_words.text());
   const auto volume = std::exchange(newest_volume_, std::nullopt);
@@ -322,11 +258,14 @@ bool ReconstructionChild::tell(const Observer& observer) {
 
 void ReconstructionChild::take(v1::ChildMessage&& message) {
   std::optional<v1::IterationPreview> preview;
+  const v1::ChildMessage::Edited answer = message.edited();
+  const bool answers = message.has_edited();
   {
     const std::lock_guard lock(mutex_);
     preview = state_->take(std::move(message));
     if (preview && preview->has_frame() && preview->has_volume()) newest_volume_ = preview;
   }
+  if (answers) edits_.take(answer);
   if (preview) board_.show(std::make_shared<const v1::IterationPreview>(std::move(*preview)));
 }
 
@@ -341,11 +280,15 @@ ChildEnd ReconstructionChild::watch(ChildProcess& process, const TakeBytes& take
     end.words = std::move(words);
     process.signal(SIGKILL);
   };
-  pollfd polled[] = {
-      {process.exited(), POLLIN, 0}, {process.messages(), POLLIN, 0}, {process.errors(), POLLIN, 0}};
+  pollfd polled[] = {{process.exited(), POLLIN, 0},
+                     {process.messages(), POLLIN, 0},
+                     {process.errors(), POLLIN, 0},
+                     {edits_.woken(), POLLIN, 0},
+                     {-1, POLLOUT, 0}};
   const pollfd& exited = polled[0];
   pollfd& messages = polled[1];
   pollfd& errors = polled[2];
+  pollfd& blocked_steps = polled[4];
   const auto read_messages = [&] {
     Status parsed;
     const ReadEnd at = read_all(messages.fd, [&](std::string_view bytes) {
@@ -365,7 +308,9 @@ ChildEnd ReconstructionChild::watch(ChildProcess& process, const TakeBytes& take
   };
 
   while (exited.revents == 0) {
+    blocked_steps.fd = edits_.blocked();
     ::poll(polled, std::size(polled), kLook);
+    edits_.send();
     if (ending_) condemn(ChildEnd::Why::cancelled, {});
     if (!tell(observer) && end.why == ChildEnd::Why::by_itself) {
       end.why = ChildEnd::Why::cancelled;

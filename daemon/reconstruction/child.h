@@ -16,6 +16,7 @@
 #include "base/quantity.h"
 #include "base/result.h"
 #include "daemon/board.h"
+#include "daemon/reconstruction/edit_queue.h"
 #include "daemon/reconstruction/kept_frames.h"
 #include "daemon/reconstruction/state.h"
 #include "daemon/work/jobs.h"
@@ -37,9 +38,9 @@ struct ReconstructionOptions {
   int niceness = 10;     ///< 0..19: frames go first
 };
 
-/// Reconstructs recordings in child processes, one at a time, so that neither a GPU's fault nor memory that
-/// runs out costs the daemon a frame. Each is a job, and so is a sequence of frames; the child dies with the
-/// daemon. Thread-safe.
+/// Reconstructs recordings in child processes, and edits them there, one at a time, so that neither a GPU's
+/// fault nor memory that runs out costs the daemon a frame. Each is a job, and so is a sequence of frames;
+/// the child dies with the daemon. Thread-safe.
 class ReconstructionChild {
  public:
   /// Every iteration goes to `board`, which must outlive the jobs, as this must.
@@ -55,6 +56,11 @@ class ReconstructionChild {
   Result<v1::ReconstructionStatus> start(const v1::ReconstructRequest& request);
   /// SIGTERM, and SIGKILL after the grace; returns at once. `refused` when none runs.
   Result<v1::ReconstructionStatus> cancel();
+  /// Hands a step to the stylization that runs, and waits until it is taken. Errors: EditQueue::ask()'s;
+  /// `refused` where none runs, or its flame isn't reconstructed yet.
+  Result<v1::StylizationStatus> edit(const v1::EditRequest& request);
+  /// The stylization that runs writes its result; returns at once. Errors: `refused`, as of edit().
+  Result<v1::ReconstructionStatus> finish();
   /// Kills the one that runs, and lets none begin any more; returns at once.
   void end();
   /// Of the one that runs, else of the last; nothing before the first.
@@ -68,6 +74,10 @@ class ReconstructionChild {
   /// A sequence's frames; none of a request that isn't of one.
   [[nodiscard]] Result<std::vector<std::uint64_t>> frames_of(const v1::ReconstructRequest& request) const;
   [[nodiscard]] std::vector<std::string> command_for(const v1::ReconstructRequest& request) const;
+  /// Of a stylization it is a new one, so that none overwrites another.
+  [[nodiscard]] std::filesystem::path result_of(const v1::ReconstructRequest& request) const;
+  [[nodiscard]] Status check_editable() const;
+  Result<ChildProcess> spawn(const v1::ReconstructRequest& request);
   /// With mutex_ held.
   [[nodiscard]] bool runs() const { return running_ && !job_->result(); }
   JobResult supervise(v1::ReconstructRequest request, const Observer& observer);
@@ -82,6 +92,7 @@ class ReconstructionChild {
   Board& board_;
   Jobs& jobs_;
   std::atomic<bool> ending_ = false;
+  EditQueue edits_;
 
   mutable std::mutex mutex_;  ///< of what follows
   std::shared_ptr<JobHandle> job_;
@@ -91,6 +102,7 @@ class ReconstructionChild {
   std::int64_t begun_ns_ = 0;
   double seconds_ = 0;  ///< that the last one took
   bool running_ = false;
+  bool stylizes_ = false;
   bool cancelling_ = false;
 };
 

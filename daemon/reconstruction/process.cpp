@@ -10,6 +10,7 @@
 #include <spawn.h>
 #include <sys/mman.h>
 #include <sys/resource.h>
+#include <sys/socket.h>
 #include <sys/syscall.h>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -89,13 +90,30 @@ class SpawnSettings {
 Result<ChildProcess> ChildProcess::spawn(const std::vector<std::string>& command, int niceness,
                                          std::string_view input) {
   EMBERLOCK_ASSIGN_OR_RETURN(const UniqueFd held, make_input(input, command[0]));
+  return spawn(command, niceness, held);
+}
+
+Result<ChildProcess> ChildProcess::spawn_fed(const std::vector<std::string>& command, int niceness) {
+  int ends[2];  // of a socket, which tells of a child that is gone without a signal
+  if (::socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, ends) != 0)
+    return system_error(errno, "cannot be fed", command[0]);
+  UniqueFd ours(ends[0]);
+  const UniqueFd its(ends[1]);
+  ::fcntl(ours.get(), F_SETFL, O_NONBLOCK);
+  EMBERLOCK_ASSIGN_OR_RETURN(ChildProcess process, spawn(command, niceness, its));
+  process.input_ = std::move(ours);
+  return process;
+}
+
+Result<ChildProcess> ChildProcess::spawn(const std::vector<std::string>& command, int niceness,
+                                         const UniqueFd& input) {
   EMBERLOCK_ASSIGN_OR_RETURN(Pipe messages, make_pipe(command[0]));
   EMBERLOCK_ASSIGN_OR_RETURN(Pipe errors, make_pipe(command[0]));
   std::vector<char*> words;
   words.reserve(command.size() + 1);
   for (const std::string& word : command) words.push_back(const_cast<char*>(word.c_str()));
   words.push_back(nullptr);
-  const SpawnSettings settings(held, messages, errors);
+  const SpawnSettings settings(input, messages, errors);
   pid_t pid = -1;
   const int code =
       ::posix_spawnp(&pid, words[0], &settings.actions, &settings.attributes, words.data(), environ);

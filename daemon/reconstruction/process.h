@@ -28,11 +28,17 @@ class ChildProcess {
   /// `input`, from a file in memory, on its stdin. Errors name the program.
   static Result<ChildProcess> spawn(const std::vector<std::string>& command, int niceness,
                                     std::string_view input = {});
+  /// The same with `input` itself as its stdin.
+  static Result<ChildProcess> spawn(const std::vector<std::string>& command, int niceness,
+                                    const UniqueFd& input);
+  /// The same, but its stdin is a socket: what is sent to input().
+  static Result<ChildProcess> spawn_fed(const std::vector<std::string>& command, int niceness);
   ChildProcess(ChildProcess&& other) noexcept
       : pid_(std::exchange(other.pid_, -1)),
         exited_(std::move(other.exited_)),
         messages_(std::move(other.messages_)),
-        errors_(std::move(other.errors_)) {}
+        errors_(std::move(other.errors_)),
+        input_(std::move(other.input_)) {}
   ChildProcess& operator=(ChildProcess&&) = delete;
   ~ChildProcess();
 
@@ -40,6 +46,8 @@ class ChildProcess {
   [[nodiscard]] int exited() const { return exited_.get(); }
   [[nodiscard]] int messages() const { return messages_.get(); }
   [[nodiscard]] int errors() const { return errors_.get(); }
+  /// Of spawn_fed(): never blocks either.
+  [[nodiscard]] int input() const { return input_.get(); }
 
   /// To the whole group, until reap().
   void signal(int signal) const;
@@ -51,7 +59,7 @@ class ChildProcess {
       : pid_(pid), exited_(std::move(exited)), messages_(std::move(messages)), errors_(std::move(errors)) {}
 
   pid_t pid_ = -1;
-  UniqueFd exited_, messages_, errors_;
+  UniqueFd exited_, messages_, errors_, input_;
 };
 
 }  // namespace emberlock::daemon

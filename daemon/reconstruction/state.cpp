@@ -49,6 +49,10 @@ std::optional<v1::IterationPreview> ReconstructionState::take(v1::ChildMessage&&
     v1::IterationPreview& preview = *message.mutable_iteration();
     preview.set_reconstruction(status_.id());
     if (preview.has_volume() && !is_sound(preview.volume())) preview.clear_volume();
+    if (preview.has_stylization()) {
+      *status_.mutable_stylization() = preview.stylization();
+      preview.mutable_stylization()->clear_views();  // which the status has
+    }
     auto& iterations = *status_.mutable_iterations();
     if (iterations.size() == kIterations) iterations.DeleteSubrange(0, 1);
     // The picture of the iteration that was kept comes once more, with numbers that are known.
@@ -58,6 +62,8 @@ std::optional<v1::IterationPreview> ReconstructionState::take(v1::ChildMessage&&
     });
     if (!known) *iterations.Add() = preview.iteration();
     return std::move(preview);
+  } else if (message.has_edited()) {
+    if (message.edited().has_taken()) *status_.mutable_stylization() = message.edited().taken();
   } else if (message.has_done()) {
     v1::ChildMessage::Done& done = *message.mutable_done();
     *status_.mutable_effects() = std::move(*done.mutable_effects());

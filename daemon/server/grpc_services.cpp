@@ -240,6 +240,15 @@ class ReconstructService final : public v1::Reconstruct::CallbackService {
                                    v1::ReconstructionStatus* response) override {
     return answer(backend_, context, response, [this] { return backend_.api.cancel_reconstruction(); });
   }
+  grpc::ServerUnaryReactor* Edit(Context* context, const v1::EditRequest* request,
+                                 v1::StylizationStatus* response) override {
+    return answer(backend_, context, response,
+                  [this, request] { return backend_.api.edit_reconstruction(*request); });
+  }
+  grpc::ServerUnaryReactor* Finish(Context* context, const v1::Empty* /*request*/,
+                                   v1::ReconstructionStatus* response) override {
+    return answer(backend_, context, response, [this] { return backend_.api.finish_reconstruction(); });
+  }
   grpc::ServerUnaryReactor* Frame(Context* context, const v1::FrameRequest* request,
                                   v1::IterationPreview* response) override {
     return answer(backend_, context, response,
@@ -254,11 +263,31 @@ class ReconstructService final : public v1::Reconstruct::CallbackService {
   GrpcBackend backend_;
 };
 
+class ArService final : public v1::Ar::CallbackService {
+ public:
+  explicit ArService(GrpcBackend backend) : backend_(backend) {}
+  grpc::ServerUnaryReactor* Results(Context* context, const v1::Empty* /*request*/,
+                                    v1::ListResultsResponse* response) override {
+    return answer(backend_, context, response, [this] { return backend_.api.list_results(); });
+  }
+  grpc::ServerUnaryReactor* Start(Context* context, const v1::ArRequest* request,
+                                  v1::ArStatus* response) override {
+    return answer(backend_, context, response, [this, request] { return backend_.api.start_ar(*request); });
+  }
+  grpc::ServerUnaryReactor* Stop(Context* context, const v1::Empty* /*request*/,
+                                 v1::ArStatus* response) override {
+    return answer(backend_, context, response, [this] { return backend_.api.stop_ar(); });
+  }
+
+ private:
+  GrpcBackend backend_;
+};
+
 }  // namespace
 
 struct GrpcServices::All {
   explicit All(GrpcBackend b)
-      : daemon(b), devices(b), strobe(b), sync(b), capture(b), sessions(b), jobs(b), reconstruct(b) {}
+      : daemon(b), devices(b), strobe(b), sync(b), capture(b), sessions(b), jobs(b), reconstruct(b), ar(b) {}
   DaemonService daemon;
   DevicesService devices;
   StrobeService strobe;
@@ -267,14 +296,16 @@ struct GrpcServices::All {
   SessionsService sessions;
   JobsService jobs;
   ReconstructService reconstruct;
+  ArService ar;
 };
 
 GrpcServices::GrpcServices(GrpcBackend backend) : all_(std::make_unique<All>(backend)) {}
 GrpcServices::~GrpcServices() = default;
 
 void GrpcServices::add_to(grpc::ServerBuilder& builder) {
-  grpc::Service* const services[] = {&all_->daemon,  &all_->devices,  &all_->strobe, &all_->sync,
-                                     &all_->capture, &all_->sessions, &all_->jobs,   &all_->reconstruct};
+  grpc::Service* const services[] = {&all_->daemon, &all_->devices,     &all_->strobe,
+                                     &all_->sync,   &all_->capture,     &all_->sessions,
+                                     &all_->jobs,   &all_->reconstruct, &all_->ar};
   for (grpc::Service* service : services) builder.RegisterService(service);
 }
 

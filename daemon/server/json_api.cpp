@@ -55,7 +55,7 @@ Result<BeginJob> job_with(Api& api, const std::string& body) {
   return BeginJob([&api, request = std::move(request)] { return (api.*ask)(request); });
 }
 
-constexpr std::array<JsonMethod, 18> kMethods{{
+constexpr std::array<JsonMethod, 23> kMethods{{
     {"Daemon/GetStatus", get_status, nullptr},
     {"Daemon/Acknowledge", call_with<&Api::acknowledge, v1::AcknowledgeRequest>, nullptr},
     {"Devices/List", call_plain<&Api::list_devices>, nullptr},
@@ -73,7 +73,12 @@ constexpr std::array<JsonMethod, 18> kMethods{{
     {"Jobs/Cancel", call_with<&Api::cancel_job, v1::CancelJobRequest>, nullptr},
     {"Reconstruct/Start", call_with<&Api::reconstruct, v1::ReconstructRequest>, nullptr},
     {"Reconstruct/Cancel", call_plain<&Api::cancel_reconstruction>, nullptr},
+    {"Reconstruct/Edit", call_with<&Api::edit_reconstruction, v1::EditRequest>, nullptr},
+    {"Reconstruct/Finish", call_plain<&Api::finish_reconstruction>, nullptr},
     {"Reconstruct/Frame", call_with<&Api::reconstructed_frame, v1::FrameRequest>, nullptr},
+    {"Ar/Results", call_plain<&Api::list_results>, nullptr},
+    {"Ar/Start", call_with<&Api::start_ar, v1::ArRequest>, nullptr},
+    {"Ar/Stop", call_plain<&Api::stop_ar>, nullptr},
 }};
 
 }  // namespace

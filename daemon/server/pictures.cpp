@@ -60,17 +60,45 @@ Result<std::string> encode(const cv::Mat& pixels, int quality) {
 
 }  // namespace
 
-Result<v1::Picture> make_picture(const std::string& camera_id, const Frame& frame,
-                                 const PicturesOptions& options) {
+ImageSize shown_size(const ImageLayout& layout, int width) {
+  const int half = is_bayer(layout.format) ? 2 : 1;
+  const ImageSize own{layout.size.width / half, layout.size.height / half};
+  if (own.width <= width) return own;
+  const double scale = static_cast<double>(width) / own.width;
+  return {std::max(1, width), std::max(1, static_cast<int>(std::lround(own.height * scale)))};
+}
+
+namespace {
+
+/// Of eight bits, in the size that is shown.
+Result<cv::Mat> small_pixels(const std::string& camera_id, const Frame& frame, ImageSize shown) {
   const ImageView image = frame.image->view();
-  if (image.width() < 2 || image.height() < 2)
+  if (image.width() < 2 || image.height() < 2 || shown.width < 1 || shown.height < 1)
     return Error{ErrorKind::bad_input, "no pixels to show", camera_id, "is its format right?"};
   cv::Mat pixels = pixels_of(image);
-  const double scale = static_cast<double>(std::min(options.width, pixels.cols)) / pixels.cols;
-  const cv::Size size(std::max(1, static_cast<int>(std::lround(pixels.cols * scale))),
-                      std::max(1, static_cast<int>(std::lround(pixels.rows * scale))));
+  const cv::Size size(shown.width, shown.height);
   if (size != pixels.size()) cv::resize(pixels, pixels, size, 0, 0, cv::INTER_AREA);
   if (pixels.depth() != CV_8U) pixels.convertTo(pixels, CV_8U, 255.0 / image.layout.white());
+  return pixels;
+}
+
+}  // namespace
+
+Result<Image> small_rgb8(const std::string& camera_id, const Frame& frame, ImageSize size) {
+  EMBERLOCK_ASSIGN_OR_RETURN(cv::Mat pixels, small_pixels(camera_id, frame, size));
+  Image image(ImageLayout{size, PixelFormat::rgb8, 8});
+  cv::Mat target(size.height, size.width, CV_8UC3, image.bytes().data());
+  if (pixels.channels() == 1)
+    cv::cvtColor(pixels, target, cv::COLOR_GRAY2RGB);
+  else
+    pixels.copyTo(target);
+  return image;
+}
+
+Result<v1::Picture> make_picture(const std::string& camera_id, const Frame& frame,
+                                 const PicturesOptions& options) {
+  const ImageSize size = shown_size(frame.image->layout(), options.width);
+  EMBERLOCK_ASSIGN_OR_RETURN(const cv::Mat pixels, small_pixels(camera_id, frame, size));
   EMBERLOCK_ASSIGN_OR_RETURN(std::string jpeg, encode(pixels, options.quality));
   v1::Picture picture;
   picture.set_camera_id(camera_id);

@@ -54,6 +54,13 @@ class Pictures {
   std::thread thread_;
 };
 
+/// The size in which a frame is shown in at most `width` columns; a Bayer mosaic in half of its own.
+ImageSize shown_size(const ImageLayout& layout, int width);
+
+/// A frame's pixels as rgb8 in that size: grey thrice, deep samples by their upper eight bits. Error
+/// bad_input: an image without pixels, or of another layout than `size` follows from.
+Result<Image> small_rgb8(const std::string& camera_id, const Frame& frame, ImageSize size);
+
 /// Encodes a frame as a JPEG of at most `width` columns: grey as grey, Bayer mosaics and RGB in colour, deep
 /// samples by their upper eight bits. Error bad_input: an image without pixels.
 Result<v1::Picture> make_picture(const std::string& camera_id, const Frame& frame,

@@ -67,20 +67,17 @@ std::optional<double> crossing(const Brightness& picture, const Eigen::Vector2d&
   const int half = std::clamp(static_cast<int>(reach / kStep), 4, kMost / 2);
   if (!picture.covers(place - half * kStep * outwards) || !picture.covers(place + half * kStep * outwards))
     return {};
-  std::array<double, kMost + 1> level{};
-  for (int i = -half; i <= half; ++i)
-    level[static_cast<std::size_t>(i + half)] = picture.at(place + i * kStep * outwards);
-  const auto mean = [&](int from) {
-    return (level[static_cast<std::size_t>(from)] + level[static_cast<std::size_t>(from + 1)]) / 2;
-  };
-  const double dark = mean(0);
-  const double bright = mean(2 * half - 1);
+  std::array<double, kMost + 1> levels{};
+  const auto level = [&levels](int step) -> double& { return levels[static_cast<std::size_t>(step)]; };
+  for (int i = 0; i <= 2 * half; ++i) level(i) = picture.at(place + (i - half) * kStep * outwards);
+  const double dark = (level(0) + level(1)) / 2;
+  const double bright = (level(2 * half - 1) + level(2 * half)) / 2;
   if (!(bright > dark)) return {};
   const double middle = (dark + bright) / 2;
   std::optional<double> nearest;
   for (int i = 0; i < 2 * half; ++i) {
-    const double a = level[static_cast<std::size_t>(i)];
-    const double b = level[static_cast<std::size_t>(i + 1)];
+    const double a = level(i);
+    const double b = level(i + 1);
     if (!(a <= middle && b > middle)) continue;
     const double at = (i - half + (middle - a) / (b - a)) * kStep;
     if (!nearest || std::abs(at) < std::abs(*nearest)) nearest = at;
@@ -108,6 +105,7 @@ std::optional<SideLine> line_through(const std::vector<Eigen::Vector2d>& places)
     const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> axes(spread);
     line = {axes.eigenvectors().col(0), axes.eigenvectors().col(0).dot(middle)};
     std::vector<double> away;
+    away.reserve(kept.size());
     for (const Eigen::Vector2d& p : kept) away.push_back(std::abs(line.normal.dot(p) - line.offset));
     std::vector<double> sorted = away;
     std::nth_element(sorted.begin(), sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2),
@@ -193,6 +191,7 @@ void meet_sides(const Brightness& picture, const Undistorted& undistorted, int c
 const std::vector<std::string>& marker_dictionaries() {
   static const std::vector<std::string> names = [] {
     std::vector<std::string> all;
+    all.reserve(std::size(kDictionaries));
     for (const auto& entry : kDictionaries) all.emplace_back(entry.first);
     return all;
   }();

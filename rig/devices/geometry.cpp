@@ -71,13 +71,17 @@ Status Geometry::set_the_stage(Rig& rig) {
   return {};
 }
 
+std::optional<v1::Calibration> Geometry::calibration_of(const std::string& camera_id) const {
+  const auto known = calibrations_.find(camera_id);
+  return known == calibrations_.end() ? std::nullopt : std::optional(known->second);
+}
+
 void Geometry::describe(Rig& rig, v1::Manifest& manifest) const {
   for (std::size_t i = 0; i < rig.size(); ++i) {
     const drivers::CameraInfo& info = rig.camera(i).info();
     v1::CameraStream& stream = *manifest.add_cameras();
     stream = drivers::to_proto(info);
-    if (const auto known = calibrations_.find(info.id); known != calibrations_.end())
-      *stream.mutable_calibration() = known->second;
+    if (const auto known = calibration_of(info.id)) *stream.mutable_calibration() = *known;
   }
   if (box_) *manifest.mutable_box() = *box_;
 }

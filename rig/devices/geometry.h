@@ -21,6 +21,8 @@ class Geometry {
 
   /// Adds the streams of all cameras, with their calibrations, and the box.
   void describe(Rig& rig, v1::Manifest& manifest) const;
+  /// Nothing where it isn't known.
+  [[nodiscard]] std::optional<v1::Calibration> calibration_of(const std::string& camera_id) const;
 
  private:
   Status read_transforms_of(const RigConfig& config, Rig& rig);

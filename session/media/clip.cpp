@@ -46,6 +46,9 @@ Result<Image> ClipReader::next() {
   const auto ticks = file_->ticks();
   if (ticks && *ticks != parts_[part].scan.ticks[within])
     return damaged("a frame before this one doesn't decode");
+  if (const ImageSize size = image->layout().size; size != parts_[part].scan.size)
+    return size_changed(parts_[part].path.string(), static_cast<std::int64_t>(within), size,
+                        parts_[part].scan.size);
   ++place_;
   return image;
 }

@@ -17,6 +17,9 @@ bool is_still_image(std::string_view head);
 /// `content` is the whole file; `where` names it in errors.
 Result<Image> decode_still_image(std::string_view content, const std::string& where);
 
+/// Of a whole PNG or JPEG, without decoding it. Errors: it is neither, or truncated.
+Result<ImageSize> picture_size(std::string_view content, const std::string& where);
+
 bool is_fits(std::string_view head);
 /// The first two-dimensional image of a FITS file. 8-bit unscaled data become gray8, everything else gray16:
 /// physical values (after BZERO and BSCALE) rounded and clamped to 0..65535, blanks 0. The file's first row

@@ -196,6 +196,15 @@ bool is_still_image(std::string_view head) {
   return is_pnm(head) || is_png(head) || is_jpeg(head) || is_tiff(head);
 }
 
+Result<ImageSize> picture_size(std::string_view content, const std::string& where) {
+  if (!is_png(content) && !is_jpeg(content))
+    return Error{ErrorKind::bad_input, "is neither a PNG nor a JPEG", where, "Convert it"};
+  EMBERLOCK_ASSIGN_OR_RETURN(const StillSize size,
+                             is_png(content) ? check_png(content, where) : check_jpeg(content, where));
+  EMBERLOCK_RETURN_IF_ERROR(check_image_size(size.width, size.height, where));
+  return ImageSize{static_cast<int>(size.width), static_cast<int>(size.height)};
+}
+
 Result<Image> decode_still_image(std::string_view content, const std::string& where) {
   if (is_pnm(content) && (content[1] == '5' || content[1] == '6')) return decode_binary_pnm(content, where);
   // OpenCV allocates whatever the header states and accepts truncated files, so both are checked first.

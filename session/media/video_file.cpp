@@ -128,6 +128,7 @@ class VideoFile final : public FrameFile {
 
   Status seek(std::int64_t ticks) override {
     wanted_ = ticks;
+    damage_.clear();
     jumped_ = av_seek_frame(input_.format.get(), input_.stream, ticks, AVSEEK_FLAG_BACKWARD) >= 0;
     if (!jumped_) return start_anew();
     avcodec_flush_buffers(input_.decoder.get());
@@ -157,6 +158,7 @@ class VideoFile final : public FrameFile {
  private:
   Status start_anew() {
     jumped_ = false;
+    damage_.clear();
     EMBERLOCK_ASSIGN_OR_RETURN(AvInput fresh, open_av_input(where_, Checking::lenient));
     input_.format.reset();  // before the file that it reads
     input_ = std::move(fresh);
@@ -174,12 +176,24 @@ class VideoFile final : public FrameFile {
       }
       if (code < 0) return damaged(av_message(code));
       if (packet_->stream_index != input_.stream) continue;
-      const bool cut = (packet_->flags & AV_PKT_FLAG_CORRUPT) != 0;
+      if ((packet_->flags & AV_PKT_FLAG_CORRUPT) != 0) {
+        damage_ = goes_on() ? "data are missing, or another recording begins" : "the file is truncated";
+        avcodec_send_packet(input_.decoder.get(), nullptr);  // the frames before it are told first
+        return {};
+      }
       const int sent = avcodec_send_packet(input_.decoder.get(), packet_.get());
-      if (cut) return damaged("the file is truncated");
       if (sent < 0) return damaged(av_message(sent));
       return {};
     }
+  }
+
+  /// Whether the stream has more packets. They are passed over.
+  [[nodiscard]] bool goes_on() {
+    do {
+      av_packet_unref(packet_.get());
+      if (av_read_frame(input_.format.get(), packet_.get()) < 0) return false;
+    } while (packet_->stream_index != input_.stream);
+    return true;
   }
 
   [[nodiscard]] Error damaged(const std::string& reason) const {
@@ -187,6 +201,7 @@ class VideoFile final : public FrameFile {
   }
   [[nodiscard]] std::string position() const { return where_ + ", frame " + std::to_string(count_); }
   [[nodiscard]] Error end() const {
+    if (!damage_.empty()) return damaged(damage_);
     if (count_ == 0)
       return {ErrorKind::bad_input, "the video holds no frames", where_, "Copy or record it again"};
     if (ends_early()) return damaged("the file is truncated, it promises more frames");
@@ -283,6 +298,7 @@ class VideoFile final : public FrameFile {
   std::uint64_t count_ = 0;
   std::optional<std::int64_t> wanted_{};  ///< frames before this time stamp are skipped
   bool jumped_ = false;                   ///< the index was used to seek to `wanted_`
+  std::string damage_;                    ///< what ends the film before its end; else empty
   std::int64_t last_pts_ = AV_NOPTS_VALUE;
 };
 

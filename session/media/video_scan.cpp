@@ -100,6 +100,13 @@ std::optional<std::int64_t> first_irregular(const std::vector<std::int64_t>& tic
   return {};
 }
 
+Error size_changed(const std::string& film, std::int64_t frame, ImageSize size, ImageSize before) {
+  return {ErrorKind::bad_input,
+          fmt::format("frame {} has {} x {} pixels, and those before it {} x {}", frame, size.width,
+                      size.height, before.width, before.height),
+          film, "Cut the video there, or scale all of it to one size"};
+}
+
 Result<VideoScan> scan_video(const std::filesystem::path& path) {
   EMBERLOCK_ASSIGN_OR_RETURN(const auto file, FrameFile::open(path, Colours::brightness));
   const VideoClaims claims = file->claims();

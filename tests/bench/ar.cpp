@@ -2,9 +2,8 @@
 // Writes what to time `emberlock ar` with, and measures its poses: a film of a marker that a hand holds a
 // camera before, with truth, 640 x 480, with noise, five lost frames every three seconds, and a flame of
 // 128^3 voxels.
-//   bench_ar FOLDER [FRAMES]: FOLDER/film.mp4 (H.264 as players take it), lossless.mkv, blurred.mp4,
-//   rig.json,
-//     flame/ and truth.json
+//   bench_ar FOLDER [FRAMES]: FOLDER/film.mp4 (H.264 as players take it), lossless.mkv, blurred.mp4 (the
+//     lens blurs by 1.5 px), rig.json, flame/ and truth.json
 //   bench_ar --judge FOLDER OUT: how far OUT/poses.json is from FOLDER/truth.json
 #include <algorithm>
 #include <cmath>

@@ -5,17 +5,22 @@
 #include <cstdint>
 #include <cstdlib>
 #include <string_view>
+#include <variant>
 
 // An edit file: what is read from it can be written and read again as the same, and stands; what can't has an
-// error that says where.
+// error that says where. A step of somebody who may name no files names none.
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   using namespace emberlock;
-  const auto edits = apply::parse_edits({reinterpret_cast<const char*>(data), size}, "fuzz.json", "");
+  const std::string_view bytes(reinterpret_cast<const char*>(data), size);
+  const auto foreign = apply::parse_foreign_operation(bytes, "fuzz", apply::GivenPictures{"given.png"});
+  const auto* const object = foreign ? std::get_if<apply::ObjectEdit>(&*foreign) : nullptr;
+  if (object != nullptr && (object->file != "given.png" || object->mask)) std::abort();
+  const auto edits = apply::parse_edits(bytes, "fuzz.json", "");
   if (!edits) {
     if (edits.error().where.empty() || edits.error().kind != ErrorKind::bad_input) std::abort();
     return 0;
   }
-  if (!apply::standing(edits->steps)) std::abort();
+  if (!apply::history_of(edits->steps)) std::abort();
   const std::string text = apply::to_json(*edits);
   const auto again = apply::parse_edits(text, "again.json", "");
   if (!again || apply::to_json(*again) != text) std::abort();

@@ -60,10 +60,21 @@ class FakeApi : public daemon::Api {
   Result<v1::ReconstructionStatus> cancel_reconstruction() override {
     return ask("cancel_reconstruction", on_cancel_reconstruction);
   }
+  Result<v1::StylizationStatus> edit_reconstruction(const v1::EditRequest& request) override {
+    return ask("edit_reconstruction", request, on_edit_reconstruction);
+  }
+  Result<v1::ReconstructionStatus> finish_reconstruction() override {
+    return ask("finish_reconstruction", on_finish_reconstruction);
+  }
   std::shared_ptr<const v1::IterationPreview> reconstructed_frame(const v1::FrameRequest& request) override {
     remember("reconstructed_frame " + request.ShortDebugString());
     return on_reconstructed_frame ? on_reconstructed_frame(request) : nullptr;
   }
+  Result<v1::ListResultsResponse> list_results() override { return ask("list_results", on_list_results); }
+  Result<v1::ArStatus> start_ar(const v1::ArRequest& request) override {
+    return ask("start_ar", request, on_start_ar);
+  }
+  Result<v1::ArStatus> stop_ar() override { return ask("stop_ar", on_stop_ar); }
 
   /// Each call's name, with its request as one line: "align tolerance: \"100rows\"".
   [[nodiscard]] std::vector<std::string> calls() const {
@@ -84,7 +95,12 @@ class FakeApi : public daemon::Api {
   std::function<Result<v1::Manifest>(const v1::SessionRequest&)> on_session;
   std::function<Result<v1::ReconstructionStatus>(const v1::ReconstructRequest&)> on_reconstruct;
   std::function<Result<v1::ReconstructionStatus>()> on_cancel_reconstruction;
+  std::function<Result<v1::StylizationStatus>(const v1::EditRequest&)> on_edit_reconstruction;
+  std::function<Result<v1::ReconstructionStatus>()> on_finish_reconstruction;
   std::function<std::shared_ptr<const v1::IterationPreview>(const v1::FrameRequest&)> on_reconstructed_frame;
+  std::function<Result<v1::ListResultsResponse>()> on_list_results;
+  std::function<Result<v1::ArStatus>(const v1::ArRequest&)> on_start_ar;
+  std::function<Result<v1::ArStatus>()> on_stop_ar;
   /// What verify, repair and export do; unset: they are done, and all is well.
   std::function<daemon::JobResult(const Observer&)> on_job;
   /// Why none of them can begin.

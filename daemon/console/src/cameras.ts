@@ -5,6 +5,7 @@ import {arrange, wordsBelow, wordsBeside} from './arrange';
 import {el, Keyed, set, setText, show} from './dom';
 import {Enlarged} from './enlarged';
 import {plural} from './format';
+import {cameraWithFlame} from './live_flame';
 import {Tile} from './tile';
 import type {Picture} from './wire';
 
@@ -18,7 +19,8 @@ export class Cameras {
   readonly root = el('section', {id: 'cameras', 'aria-label': 'Cameras'}, el('h2', {class: 'hidden'}, 'Cameras ', this.summary), this.grid, this.none);
   readonly enlarged = new Enlarged(() => this.wish());
   private readonly tiles = new Keyed<DaemonStatus['cameras'][number], Tile>(this.grid, id => this.make(id), (tile, camera) =>
-    tile.show(camera, this.status?.alignment?.tolerance_s || undefined, camera.id === this.status?.alignment?.reset_next));
+    tile.show(camera, this.status?.alignment?.tolerance_s || undefined, camera.id === this.status?.alignment?.reset_next,
+              this.status !== undefined && cameraWithFlame(this.status) === camera.id));
   private readonly visible = new Set<string>();
   private readonly sight = new IntersectionObserver(entries => {
     for (const entry of entries) {

@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 // One camera over the whole page, with every number known of it.
 import type {CameraStatus, DaemonStatus} from './api.gen';
-import {el, setText} from './dom';
+import {el, setText, show} from './dom';
 import {Exposure} from './exposure';
 import {count, fixed, known, micros, ppm, rows, short, span} from './format';
 import {lampAdvice, lampMissing} from './lamp';
 import {cameraWord, showSign, Sign} from './light';
+import {cameraWithFlame, LiveFlame} from './live_flame';
 import {Gauge, Overlay} from './overlay';
 import {LivePicture} from './picture';
 
@@ -51,6 +52,8 @@ export class Enlarged {
   private readonly title = el('h2');
   private readonly reason = el('p', {class: 'reason'});
   private readonly exposure = new Exposure(this.picture.canvas);
+  private readonly flame = new LiveFlame();
+  private readonly flameMark = el('span', {class: 'flame-mark', hidden: true}, 'flame added');
   private readonly lamp = el('p', {class: 'lamp-advice'});
   private readonly list = el('dl', {class: 'facts'});
   private readonly error = el('p', {class: 'error-rows'});
@@ -59,11 +62,11 @@ export class Enlarged {
 
   constructor(private readonly changed: () => void) {
     this.root = el('dialog', {class: 'enlarged', 'aria-label': 'Camera'},
-      el('div', {class: 'picture'}, this.picture.canvas, this.exposure.marks, this.overlay.root),
+      el('div', {class: 'picture'}, this.picture.canvas, this.exposure.marks, this.overlay.root, this.flameMark),
       el('div', {class: 'side'},
         el('header', {}, this.sign.root, this.title, this.word,
           el('button', {class: 'close', 'aria-label': 'Close', onclick: () => this.root.close()}, '✕')),
-        this.error, this.gauge.root, this.reason, this.lamp, this.exposure.root, this.list,
+        this.error, this.gauge.root, this.reason, this.lamp, this.flame.root, this.exposure.root, this.list,
         el('p', {class: 'legend'}, el('span', {class: 'key lamp'}, '○ lamp'), el('span', {class: 'key dot'}, '◇ dot'),
           el('span', {class: 'key target'}, '┄ target row'), el('span', {class: 'key band'}, '▒ tolerance')),
         el('p', {class: 'note'}, '← → other cameras, Esc back')));
@@ -75,6 +78,7 @@ export class Enlarged {
       this.changed();
     });
     this.root.addEventListener('keydown', event => {
+      if ((event.target as HTMLElement).closest('input, select')) return;  // they have arrow keys of their own
       if (event.key === 'ArrowLeft') this.turn(-1);
       if (event.key === 'ArrowRight') this.turn(1);
     });
@@ -113,6 +117,10 @@ export class Enlarged {
     this.exposure.lampMissing = lampMissing(camera, status.faults);
     setText(this.lamp, this.exposure.lampMissing ? lampAdvice(camera) : '');
     this.overlay.show(camera);
+    this.flame.show(status, camera.id);
+    const added = cameraWithFlame(status) === camera.id;
+    show(this.flameMark, added);
+    this.exposure.pause(added);
     const all = facts(camera, tolerance);
     while (this.list.children.length > all.length) this.list.lastElementChild!.remove();
     while (this.list.children.length < all.length) this.list.append(el('div', {}, el('dt'), el('dd')));

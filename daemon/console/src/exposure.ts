@@ -123,12 +123,21 @@ export class Exposure {
     this.timer = undefined;
   }
 
+  /** While something is drawn into the pictures, they tell nothing of the camera's. */
+  pause(paused: boolean): void {
+    if (paused === this.root.hidden) return;
+    show(this.root, !paused);
+    if (paused) show(this.marks, false);
+    else this.forget();
+  }
+
   private forget(): void {
     this.best = 0;
     this.look();
   }
 
   private look(): void {
+    if (this.root.hidden) return;
     const scale = Math.min(1, kWidest / this.source.width);
     const [width, height] = [Math.round(this.source.width * scale), Math.round(this.source.height * scale)];
     if (width < 32 || height < 24) return;  // no picture yet

@@ -17,6 +17,7 @@ import {Record} from './record';
 import {Reconstruction} from './reconstruction';
 import {Sessions} from './sessions';
 import {Strobe} from './strobe';
+import {Stylization} from './stylize/stylization';
 import {Token} from './token';
 
 const header = new Header();
@@ -25,6 +26,7 @@ const record = new Record();
 const alignment = new Alignment();
 const strobe = new Strobe();
 const reconstruction = new Reconstruction();
+const stylization = new Stylization();
 const sessions = new Sessions();
 const journal = new Journal();
 const token = new Token(word => link.unlock(word));
@@ -39,13 +41,14 @@ const keys = new Keys([
   {key: '2', words: 'reconstruction', run: goTo('reconstruction')},
   {key: '3', words: 'sessions', run: goTo('sessions')},
   {key: '4', words: 'journal', run: goTo('journal')},
+  {key: '5', words: 'stylization', run: goTo('stylization')},
 ]);
 
 document.body.append(
   header.root, bar.root,
   el('main', {},
     el('div', {class: 'rig-view'}, cameras.root, el('aside', {}, record.root, alignment.root, strobe.root)),
-    reconstruction.root, sessions.root, journal.root),
+    stylization.root, reconstruction.root, sessions.root, journal.root),
   el('footer', {}, figures, el('button', {class: 'quiet', type: 'button', onclick: () => keys.help.showModal()}, 'Keys: ?')),
   cameras.enlarged.root, keys.help, token.root, complaints);
 
@@ -69,14 +72,22 @@ const link: Link = new Link({
     heard(status);
     const {phase, recording} = status;
     set(document.documentElement, 'data-filmed', phase === 'CAPTURING' || phase === 'FINISHING' ? recording?.purpose : undefined);
-    for (const part of [header, bar, cameras, record, alignment, strobe, reconstruction, sessions]) part.show(status);
+    for (const part of [header, bar, cameras, record, alignment, strobe, stylization, reconstruction, sessions]) part.show(status);
   },
   notice: notice => journal.add(notice),
-  iteration: preview => reconstruction.preview(preview),
+  iteration(preview) {
+    stylization.preview(preview);
+    reconstruction.preview(preview);
+  },
   bytes(head, bytes) {
     if (head.kind === 'picture') cameras.offer(head, bytes);
-    else if (head.kind === 'volume') reconstruction.showVolume(head, bytes);
-    else void reconstruction.view(head, bytes);
+    else if (head.kind === 'volume') {
+      stylization.volume(head);
+      reconstruction.showVolume(head, bytes);
+    } else {
+      stylization.picture(head, bytes);
+      void reconstruction.view(head, bytes);
+    }
   },
 });
 

@@ -101,6 +101,7 @@ class Row {
   private readonly job = el('div', {class: 'job', hidden: true}, this.progress, this.doing, this.report);
   private readonly buttons: HTMLButtonElement[];
   private readonly reconstruct: HTMLButtonElement;
+  private readonly stylize: HTMLButtonElement;
   private readonly frame: FrameChoice;
   private readonly quantity: QuantityChoice;
   private readonly background = el('span', {class: 'background', role: 'status', hidden: true});
@@ -119,6 +120,10 @@ class Row {
       const frame = this.frame.request();
       if (frame) void this.quantity.request().then(quantity => quantity && this.start({session, ...frame, ...quantity}));
     });
+    this.stylize = button('Stylize', () => {
+      const frame = this.frame.request();
+      if (frame) this.start({session, ...frame, stylize: true});
+    });
     this.buttons = [
       button('Verify', () => this.run(tell => follow('Sessions/Verify', {session}, tell))),
       button('Repair', () => this.run(tell => follow('Sessions/Repair', {session}, tell))),
@@ -129,7 +134,7 @@ class Row {
     this.cells.forEach((cell, place) => set(cell, 'data-name', names[place]));
     this.root = el('tr', {'data-session': session},
       el('th', {scope: 'row'}, el('bdi', {}, session), el('span', {class: 'state'}, this.sign.root, this.state), this.background), ...this.cells,
-      el('td', {class: 'actions'}, el('div', {}, ...this.buttons, this.reconstruct, this.frame.root, this.quantity.root), this.job));
+      el('td', {class: 'actions'}, el('div', {}, ...this.buttons, this.stylize, this.reconstruct, this.frame.root, this.quantity.root), this.job));
   }
 
   show(entry: Entry): void {
@@ -154,10 +159,12 @@ class Row {
 
   private enable(): void {
     for (const button of this.buttons) button.disabled = this.busy || this.salvaged;
-    this.reconstruct.disabled = this.busy || this.salvaged || !this.entry?.calibrated;
+    this.reconstruct.disabled = this.stylize.disabled = this.busy || this.salvaged || !this.entry?.calibrated;
     if (this.entry) this.frame.show(this.entry, this.reconstruct.disabled);
     this.quantity.enable(!this.reconstruct.disabled);
-    set(this.reconstruct, 'title', this.entry?.calibrated ? undefined : 'Its cameras are not calibrated, or the volume is not known.');
+    const missing = this.entry?.calibrated ? undefined : 'Its cameras are not calibrated, or the volume is not known.';
+    set(this.reconstruct, 'title', missing);
+    set(this.stylize, 'title', missing ?? 'Reconstruct a frame, and edit it while that goes on.');
   }
 
   private start(request: Partial<ReconstructRequest>): void {

@@ -22,7 +22,8 @@ export class Tile {
   private readonly lost = el('dd');
   private readonly reason = el('p', {class: 'reason'});
   private readonly nextMark = el('span', {class: 'next-mark', hidden: true});
-  private readonly frame = el('div', {class: 'picture'}, this.picture.canvas, this.overlay.root, this.nextMark);
+  private readonly flameMark = el('span', {class: 'flame-mark', hidden: true}, 'flame added');
+  private readonly frame = el('div', {class: 'picture'}, this.picture.canvas, this.overlay.root, this.nextMark, this.flameMark);
   readonly root: HTMLElement;
 
   constructor(readonly id: string, open: (id: string) => void) {
@@ -46,8 +47,8 @@ export class Tile {
     });
   }
 
-  /** `next`: somebody is to reset it now. */
-  show(camera: CameraStatus, tolerance: number | undefined, next: boolean): void {
+  /** `next`: somebody is to reset it now; `flame`: one is drawn into its pictures. */
+  show(camera: CameraStatus, tolerance: number | undefined, next: boolean, flame: boolean): void {
     this.camera = camera;
     const word = cameraWord(camera, tolerance);
     showSign(this.sign, this.word, camera.light, word);
@@ -55,6 +56,7 @@ export class Tile {
     set(this.root, 'data-state', camera.state);
     set(this.root, 'data-next', next);
     show(this.nextMark, camera.reset_next);
+    show(this.flameMark, flame);
     setText(this.nextMark, next ? 'Reset this camera now' : camera.reset === 'BY_HAND' ? 'Reset after that' : 'Being reset');
     this.overlay.show(camera);
     this.frame.style.setProperty('--aspect', camera.width > 0 && camera.height > 0 ? String(camera.width / camera.height) : '4 / 3');

@@ -10,7 +10,9 @@ import type {AlignmentStatus} from '../../../daemon/console/src/api.gen';
 import {bench, drawn, kPhone, kSizes} from './bench';
 import {faultyAligning, faultyCapturing, noLamp} from './faulty';
 import {Refusal} from './mock';
+import {flamePictures} from './pictures';
 import {alignment, capturing, idle, locked, reconstruction, sequence} from './scene';
+import {StylizedFlame} from './stylize_scene';
 import {until} from '../support/chromium';
 
 const kAxe = readFileSync(fileURLToPath(new URL('../../../daemon/console/node_modules/axe-core/axe.min.js', import.meta.url)), 'utf8');
@@ -33,6 +35,7 @@ describe.each([kSizes[0], kPhone])('axe at $width x $height', size => {
   test('finds nothing in any state', async () => {
     rig.mock.status = idle();
     rig.mock.answers['Sessions/List'] = sessions;
+    rig.mock.answers['Ar/Results'] = () => ({results: [{session: 'candle 1', middle_frame: false, frames: [3]}], dictionaries: ['4X4_50']});
     rig.mock.answers['Sync/Align'] = () => { throw new Refusal(400, 'INVALID_ARGUMENT', '"1banana" is no tolerance.'); };
     const page = await rig.open(size);
     await page.waitForSelector('tr[data-session]');
@@ -60,10 +63,27 @@ describe.each([kSizes[0], kPhone])('axe at $width x $height', size => {
     await page.locator('.tile').first().press('Enter');
     await page.waitForSelector('.enlarged[open]');
     expect(await findings(page), 'enlarged').toEqual([]);
+    await page.getByText('Flame on a marker').click();
+    await page.getByRole('option', {name: 'candle 1: frame 3'}).waitFor({state: 'attached'});
+    expect(await findings(page), 'a flame is chosen').toEqual([]);
+    rig.mock.show({ar: {state: 'SHOWN', camera_id: await page.locator('.enlarged h2').innerText(), session: 'candle 1', result: 'frame-3', marker: 'aruco:4X4_50:7:80mm', calibrated: true, pose: 'HELD', without: 2, residual_px: 0, rate_hz: 21, delay_s: 0.04, seen_instead: '', error: ''}});
+    await page.getByRole('button', {name: 'Stop the flame'}).waitFor();
+    expect(await findings(page), 'a flame is shown').toEqual([]);
     await page.keyboard.press('Escape');
     await page.keyboard.press('?');
     await page.waitForSelector('.help[open]');
     expect(await findings(page), 'keys').toEqual([]);
+  });
+
+  test('finds nothing in a stylization, whichever tool is at hand', async () => {
+    const flame = new StylizedFlame(rig.mock, await flamePictures(rig.browser, 2));
+    const page = await rig.open(size);
+    flame.preview();
+    await page.waitForSelector('#stylization .stylized[data-view="virtual-00"]');
+    for (const name of ['Brush', 'Object', 'Mask', 'Region', 'Colour']) {
+      await page.locator('.tool-choice label', {hasText: name}).click();
+      expect(await findings(page), name).toEqual([]);
+    }
   });
 });
 

@@ -20,8 +20,24 @@ async function freePort(): Promise<number> {
   });
 }
 
+/** The configuration's part of a rig of virtual cameras that film a flame, and their strobe. */
+export const virtualRig = (name: string, cameras: number, size: string): string => `
+[rig]
+name = "${name}"
+[rig.virtual]
+scene = "flame"
+seed = 1
+[[rig.camera]]
+driver = "virtual"
+count = ${cameras}
+size = "${size}"
+[rig.strobe]
+driver = "virtual"
+`;
+
 export class Daemon {
-  private readonly folder = mkdtempSync(join(tmpdir(), 'emberlock-walk-'));
+  /** Where it keeps what it records, and beside that what it reconstructs. */
+  readonly folder = mkdtempSync(join(tmpdir(), 'emberlock-walk-'));
   private child?: ChildProcess;
   private said = '';
   private ended = false;
@@ -29,10 +45,11 @@ export class Daemon {
   private bin = '';
   url = '';
 
-  /** `rig` is the configuration's part that tells of cameras and strobe. */
-  async start(bin: string, console: string, rig: string): Promise<void> {
+  /** `rig` is the configuration's part that tells of cameras and strobe; `voxels` those of reconstructions. What an earlier one recorded is still there. */
+  async start(bin: string, console: string, rig: string, voxels = 48): Promise<void> {
     const port = await freePort();
     this.bin = bin;
+    this.ended = false;
     writeFileSync(join(this.folder, 'token'), this.token, {mode: 0o600});
     this.url = `http://127.0.0.1:${port}/`;
     const configuration = join(this.folder, 'emberlock.toml');
@@ -41,7 +58,7 @@ export class Daemon {
 folder = "${this.folder}/sessions"
 [reconstruction]
 program = "${bin}/emberlock"
-voxels = 48
+voxels = ${voxels}
 [server]
 socket = "${this.folder}/emberlockd.sock"
 http_listen = "127.0.0.1:${port}"
@@ -80,11 +97,15 @@ console = "${console}"
     this.child?.kill('SIGKILL');
   }
 
+  /** As an operator ends it; what was recorded stays. */
+  async end(): Promise<void> {
+    if (!this.child || this.ended) return;
+    this.child.kill('SIGTERM');
+    await until(() => this.ended, Boolean, 'emberlockd ended', 20).catch(() => this.kill());
+  }
+
   async stop(): Promise<void> {
-    if (this.child && !this.ended) {
-      this.child.kill('SIGTERM');
-      await until(() => this.ended, Boolean, 'emberlockd ended', 20).catch(() => this.kill());
-    }
+    await this.end();
     rmSync(this.folder, {recursive: true, force: true});
   }
 }

@@ -10,7 +10,7 @@ import {afterAll, afterEach, beforeAll, expect, test} from 'vitest';
 import type {DaemonStatus, ListSessionsResponse, Manifest} from '../../../daemon/console/src/api.gen';
 import {decode} from '../../../daemon/console/src/wire';
 import {openPage, screenshot, startChromium, until, type Watched} from '../support/chromium';
-import {Daemon} from '../support/daemon';
+import {Daemon, virtualRig} from '../support/daemon';
 import {correlation, facts, grey, number, numbers, seconds} from '../support/shown';
 import {frameToScreen} from './figures';
 
@@ -19,19 +19,7 @@ const kConsole = process.env.EMBERLOCK_CONSOLE ?? `${kBuild}/console`;
 const kBin = process.env.EMBERLOCK_BIN ?? `${kBuild}/bin`;
 const kCameras = 11;
 const kTolerance = 30;  // rows
-const kRig = `
-[rig]
-name = "eleven virtual cameras"
-[rig.virtual]
-scene = "flame"
-seed = 1
-[[rig.camera]]
-driver = "virtual"
-count = ${kCameras}
-size = "320x240"
-[rig.strobe]
-driver = "virtual"
-`;
+const kRig = virtualRig('eleven virtual cameras', kCameras, '320x240');
 
 const daemon = new Daemon();
 const figures: Record<string, string> = {};

@@ -145,6 +145,47 @@ TEST_F(DaemonReconstruction, ASequenceBecomesAVolumeForEachFrameThatCanBeFetched
   }
 }
 
+TEST_F(DaemonReconstruction, AFrameIsEditedWhileItGoesOnAndReplaysToTheSameBits) {
+  v1::ReconstructRequest request = candle();
+  request.set_frame(1);
+  request.set_stylize(true);
+  ASSERT_TRUE(child_->start(request).ok());
+  wait_for([&] { return child_->status()->has_stylization(); });
+  ASSERT_TRUE(running()) << child_->status()->error();
+  const auto edit = [&](const std::string& operation) {
+    v1::EditRequest step;
+    step.set_operation(operation);
+    return child_->edit(step);
+  };
+  const auto held_out = edit(
+      R"({"op": "brush", "view": "cam10", "points": [[32, 24]], "radius": 5, "mode": "add", "strength": 90})");
+  ASSERT_FALSE(held_out.ok());
+  EXPECT_THAT(held_out.error().message(), HasSubstr("is held out"));
+  const auto taken = edit(
+      R"({"op": "brush", "view": "cam3", "points": [[32, 24]], "radius": 5, "mode": "add", "strength": 90})");
+  ASSERT_TRUE(taken.ok()) << taken.error().message();
+  EXPECT_EQ(taken->steps(), 1U);
+  wait_for([&] { return child_->status()->stylization().pauses(); });
+  const std::uint32_t passes = child_->status()->stylization().passes();
+  EXPECT_GT(passes, 0U) << "it went on, and waits";
+  EXPECT_EQ(board_.iterations(0).back()->stylization().passes(), passes);
+  ASSERT_TRUE(edit(R"({"op": "cut", "region": {"center": [0, 0, 0], "size": [0.1, 0.1, 0.02]}})").ok());
+  ASSERT_TRUE(child_->finish().ok());
+  wait_for([] { return false; });
+  const v1::ReconstructionStatus status = *child_->status();
+  ASSERT_EQ(status.state(), State::DONE) << status.error();
+  EXPECT_EQ(status.result(), folder_ / "results/candle/frame-1-stylized");
+  const Shell again = shell(
+      fmt::format("{0} stylize {1} --frame 1 --hold-out 10 --device cpu --edits {2}/edits.json --out {3}",
+                  EMBERLOCK_PROGRAM, (folder_ / "sessions/candle").string(), status.result(),
+                  (folder_ / "again").string()));
+  ASSERT_EQ(again.status, 0) << again.output;
+  const auto first = recon::read_volume(fs::path(status.result()) / "volume.vdb");
+  const auto replayed = recon::read_volume(folder_ / "again/volume.vdb");
+  ASSERT_TRUE(first.ok() && replayed.ok());
+  EXPECT_EQ(replayed->emission, first->emission);
+}
+
 TEST_F(DaemonReconstruction, WithoutTheDaemonTheProgramReconstructsASequenceToo) {
   const std::string command =
       fmt::format("{} reconstruct {} --device cpu --voxels 12 --frame 0 --out {}", EMBERLOCK_PROGRAM,

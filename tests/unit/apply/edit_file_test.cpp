@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "apply/edit_file.h"
 
+#include <optional>
 #include <string>
 #include <utility>
 
@@ -88,14 +89,36 @@ TEST(EditFile, UndoTakesTheNewestThatStandsAndRedoGivesItBack) {
           {"pass": 2, "op": "brush", "view": "3", "points": [[0, 0]], "radius": 1, "mode": "erase"})"),
       "e.json", "");
   ASSERT_TRUE(edits) << edits.error().message();
-  const auto stand = standing(edits->steps);
-  ASSERT_TRUE(stand);
-  ASSERT_EQ(stand->size(), 2U);
-  EXPECT_EQ(std::get<BrushEdit>(*(*stand)[0]).view, "1");
-  EXPECT_EQ(std::get<BrushEdit>(*(*stand)[1]).view, "3");
+  const auto history = history_of(edits->steps);
+  ASSERT_TRUE(history);
+  ASSERT_EQ(history->standing.size(), 2U);
+  EXPECT_EQ(std::get<BrushEdit>(*history->standing[0]).view, "1");
+  EXPECT_EQ(std::get<BrushEdit>(*history->standing[1]).view, "3");
+  EXPECT_TRUE(history->undone.empty());
   std::vector<Step> steps = edits->steps;
   steps.push_back({3, Redo{}});  // what was undone is forgotten once something else was done
-  EXPECT_FALSE(standing(steps));
+  EXPECT_FALSE(history_of(steps));
+}
+
+TEST(EditFile, WhoMayNameNoFilesGivesPicturesInstead) {
+  const GivenPictures given{"there/a.png", "there/b.png"};
+  const auto foreign = [](const std::string& text, const std::optional<GivenPictures>& pictures) {
+    return parse_foreign_operation(text, "step", pictures);
+  };
+  const std::string object = R"({"op": "object", "view": "1", "position": [1, 2])";
+  const auto read = foreign(object + "}", given);
+  ASSERT_TRUE(read) << read.error().message();
+  EXPECT_EQ(std::get<ObjectEdit>(*read).file, given.file);
+  EXPECT_EQ(std::get<ObjectEdit>(*read).mask, given.mask);
+  for (const std::string key : {"file", "mask"}) {
+    const auto named = foreign(object + ", \"" + key + "\": \"/etc/hostname\"}", given);
+    ASSERT_FALSE(named);
+    EXPECT_THAT(named.error().message(), HasSubstr("step: " + key + ": names a file"));
+  }
+  EXPECT_THAT(foreign(object + "}", {}).error().message(), HasSubstr("step: picture: is missing"));
+  EXPECT_THAT(foreign(R"({"op": "undo"})", given).error().message(), HasSubstr("picture: is for objects"));
+  EXPECT_TRUE(foreign(R"({"op": "undo"})", {}));
+  EXPECT_THAT(foreign(R"({"op": "undo", "pass": 3})", {}).error().message(), HasSubstr("pass: isn't known"));
 }
 
 TEST(EditFile, OfAnotherSceneIsRefusedAndSaysWhatDiffers) {

@@ -26,10 +26,10 @@ recon::Volume glow() {
 
 FlameColours flame() { return {recon::standard_response(), 74}; }
 
-ShownVolume shown(const std::vector<Operation>& operations, Colours colours = Colours::captured) {
+EditedVolume shown(const std::vector<Operation>& operations, Colours colours = Colours::captured) {
   std::vector<const Operation*> stand;
   for (const Operation& operation : operations) stand.push_back(&operation);
-  return shown_volume(glow(), recon::whole_grid(kGrid), flame(), colours, stand);
+  return edited_volume(glow(), recon::whole_grid(kGrid), flame(), colours, stand);
 }
 
 double sum_at(const recon::Volume& volume, std::size_t p) {
@@ -39,14 +39,14 @@ double sum_at(const recon::Volume& volume, std::size_t p) {
 
 const Region kBall{Region::Shape::ellipsoid, {0, 0, 0}, {0.041, 0.041, 0.041}, Meters(0)};
 
-TEST(ShownVolume, IsWhatWasReconstructedWhereNothingWasAskedFor) {
-  const ShownVolume as_is = shown({});
+TEST(EditedVolume, IsWhatWasReconstructedWhereNothingWasAskedFor) {
+  const EditedVolume as_is = shown({});
   EXPECT_EQ(as_is.volume.emission, glow().emission);
   EXPECT_EQ(as_is.volume.extinction, glow().extinction);
 }
 
-TEST(ShownVolume, ABrightnessOfTwoDoublesTheLightOfItsRegionAlone) {
-  const ShownVolume twice = shown({BrightnessEdit{kBall, 2}});
+TEST(EditedVolume, ABrightnessOfTwoDoublesTheLightOfItsRegionAlone) {
+  const EditedVolume twice = shown({BrightnessEdit{kBall, 2}});
   const recon::Volume before = glow();
   for (int k = 0; k < 9; ++k)
     for (int j = 0; j < 9; ++j)
@@ -58,7 +58,7 @@ TEST(ShownVolume, ABrightnessOfTwoDoublesTheLightOfItsRegionAlone) {
       }
 }
 
-TEST(ShownVolume, ARegionsEdgeFadesFromOneToNothing) {
+TEST(EditedVolume, ARegionsEdgeFadesFromOneToNothing) {
   Region box{Region::Shape::box, {0, 0, 0}, {0.02, 0.02, 0.02}, Meters(0.02)};
   double last = 1;
   for (double x = 0; x < 0.04; x += 0.002) {
@@ -71,9 +71,9 @@ TEST(ShownVolume, ARegionsEdgeFadesFromOneToNothing) {
   EXPECT_NEAR(share_of(box, {0, 0.02, 0}), 0.5, 1e-12);
 }
 
-TEST(ShownVolume, ACutRegionNeitherShinesNorAbsorbsAndKeepIsItsOpposite) {
-  const ShownVolume cut = shown({RegionEdit{kBall, Part::cut}});
-  const ShownVolume kept = shown({RegionEdit{kBall, Part::keep}});
+TEST(EditedVolume, ACutRegionNeitherShinesNorAbsorbsAndKeepIsItsOpposite) {
+  const EditedVolume cut = shown({RegionEdit{kBall, Part::cut}});
+  const EditedVolume kept = shown({RegionEdit{kBall, Part::keep}});
   const recon::Volume before = glow();
   for (std::size_t i = 0; i < before.emission.size(); ++i)
     EXPECT_EQ(cut.volume.emission[i] + kept.volume.emission[i], before.emission[i]);
@@ -85,11 +85,11 @@ TEST(ShownVolume, ACutRegionNeitherShinesNorAbsorbsAndKeepIsItsOpposite) {
   EXPECT_LT(cut.hull.count, 512U);
 }
 
-TEST(ShownVolume, AColourCurveChangesColourAlone) {
+TEST(EditedVolume, AColourCurveChangesColourAlone) {
   const ColourEdit blue{{{Kelvin(1000), {1, 0, 0}, 1}, {Kelvin(2300), {0, 0, 2}, 1}}};
   for (const Colours colours : {Colours::captured, Colours::flame}) {
-    const ShownVolume before = shown({}, colours);
-    const ShownVolume after = shown({blue}, colours);
+    const EditedVolume before = shown({}, colours);
+    const EditedVolume after = shown({blue}, colours);
     EXPECT_EQ(after.volume.extinction, before.volume.extinction);
     EXPECT_EQ(after.kelvin, before.kelvin);
     for (std::size_t p = 0; p < kGrid.size(); ++p) {
@@ -101,9 +101,9 @@ TEST(ShownVolume, AColourCurveChangesColourAlone) {
   }
 }
 
-TEST(ShownVolume, TheLookUpKeepsGreenAndColoursByTemperature) {
-  const ShownVolume captured = shown({});
-  const ShownVolume looked_up = shown({}, Colours::flame);
+TEST(EditedVolume, TheLookUpKeepsGreenAndColoursByTemperature) {
+  const EditedVolume captured = shown({});
+  const EditedVolume looked_up = shown({}, Colours::flame);
   std::vector<std::pair<float, float>> red_by_kelvin;  // over green
   for (std::size_t p = 0; p < kGrid.size(); ++p) {
     EXPECT_EQ(looked_up.volume.emission[3 * p + 1], captured.volume.emission[3 * p + 1]);

@@ -256,7 +256,7 @@ TEST(Stylization, TheOutcomeIsAsShownAndItsReportOfTheEditedPictures) {
   do_edit(*run, BrightnessEdit{kSlab, 3});
   const auto outcome = run->outcome();
   ASSERT_TRUE(outcome) << outcome.error().message();
-  const ShownVolume shown = run->shown();
+  const EditedVolume shown = run->shown();
   EXPECT_EQ(outcome->reconstruction.volume.emission, shown.volume.emission);
   EXPECT_EQ(outcome->temperature->kelvin, shown.kelvin);
   EXPECT_EQ(outcome->renders.size(), flame.scene.views.size());

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <filesystem>
 #include <fstream>
-#include <stdexcept>
 #include <string>
 #include <vector>
 
@@ -16,6 +15,7 @@
 #include "recon/export/volume_file.h"
 #include "tests/support/scene_files.h"
 #include "tests/support/stylized_flame.h"
+#include "tests/support/typed_input.h"
 #include "tests/support/verb.h"
 
 namespace emberlock::cli {
@@ -100,30 +100,8 @@ TEST_F(StylizeVerb, SaysWhichStepCannotBeDone) {
   EXPECT_FALSE(fs::exists(out_));
 }
 
-/// What stdin reads while it lives.
-class TypedLines {
- public:
-  explicit TypedLines(const std::string& text) : before_(::dup(STDIN_FILENO)) {
-    int ends[2];
-    if (::pipe(ends) != 0) throw std::runtime_error("no pipe");
-    if (::write(ends[1], text.data(), text.size()) < 0) throw std::runtime_error("no bytes");
-    ::close(ends[1]);
-    ::dup2(ends[0], STDIN_FILENO);
-    ::close(ends[0]);
-  }
-  ~TypedLines() {
-    ::dup2(before_, STDIN_FILENO);
-    ::close(before_);
-  }
-  TypedLines(const TypedLines&) = delete;
-  TypedLines& operator=(const TypedLines&) = delete;
-
- private:
-  int before_;
-};
-
 TEST_F(StylizeVerb, TakesStepsWhileItRunsAndRecordsThoseThatCouldBeDone) {
-  const TypedLines typed(
+  const test::TypedInput typed(
       R"({"op": "brush", "view": "view1.png", "points": [[20, 20]], "radius": 4, "mode": "add", "strength": 50}
 {"op": "brush"}
 {"op": "undo"}

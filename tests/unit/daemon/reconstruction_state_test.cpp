@@ -92,6 +92,24 @@ TEST(ReconstructionState, IterationsBearItsIdAndThePictureAtTheEndIsNoFurtherOne
   EXPECT_EQ(state.status().iterations_size(), 2);
 }
 
+TEST(ReconstructionState, OfAStylizationTheStatusHasTheViewsAndPreviewsTheRest) {
+  ReconstructionState state = begun();
+  EXPECT_FALSE(state.status().has_stylization()) << "it can't be edited yet";
+  v1::ChildMessage message = iteration(3);
+  message.mutable_iteration()->mutable_stylization()->set_passes(1);
+  message.mutable_iteration()->mutable_stylization()->add_views()->set_name("cam0");
+  const auto preview = state.take(std::move(message));
+  ASSERT_TRUE(preview);
+  EXPECT_EQ(preview->stylization().passes(), 1U);
+  EXPECT_EQ(preview->stylization().views_size(), 0);
+  ASSERT_EQ(state.status().stylization().views_size(), 1);
+  v1::ChildMessage edited;
+  *edited.mutable_edited()->mutable_taken() = state.status().stylization();
+  edited.mutable_edited()->mutable_taken()->set_steps(4);
+  EXPECT_FALSE(state.take(std::move(edited)));
+  EXPECT_EQ(state.status().stylization().steps(), 4U);
+}
+
 TEST(ReconstructionState, OfManyIterationsTheNewestAreKept) {
   ReconstructionState state = begun();
   for (std::uint32_t i = 1; i <= 1200; ++i) state.take(iteration(i));

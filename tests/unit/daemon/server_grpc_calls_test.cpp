@@ -61,6 +61,32 @@ TEST_F(ServerGrpcCalls, EachKindOfErrorHasItsCodeAndTheWholeMessage) {
   }
 }
 
+TEST_F(ServerGrpcCalls, AStepReachesTheStylizationAndItsRefusalTheCaller) {
+  api.on_edit_reconstruction = [](const v1::EditRequest& request) -> Result<v1::StylizationStatus> {
+    if (request.picture() != "picture") return Error{ErrorKind::bad_input, "is missing", "step: picture"};
+    v1::StylizationStatus status;
+    status.set_steps(3);
+    return status;
+  };
+  serve();
+  const auto reconstruct = v1::Reconstruct::NewStub(channel());
+  v1::EditRequest request;
+  request.set_operation("{}");
+  v1::StylizationStatus answer;
+  grpc::ClientContext first;
+  const grpc::Status refused = reconstruct->Edit(&first, request, &answer);
+  EXPECT_EQ(refused.error_code(), grpc::INVALID_ARGUMENT);
+  EXPECT_EQ(refused.error_message(), "step: picture: is missing");
+  request.set_picture("picture");
+  grpc::ClientContext second;
+  EXPECT_TRUE(reconstruct->Edit(&second, request, &answer).ok());
+  EXPECT_EQ(answer.steps(), 3U);
+  grpc::ClientContext third;
+  v1::ReconstructionStatus finishing;
+  EXPECT_TRUE(reconstruct->Finish(&third, {}, &finishing).ok());
+  EXPECT_EQ(api.calls().back(), "finish_reconstruction");
+}
+
 TEST_F(ServerGrpcCalls, AFrameThatIsNotHeldIsNotFound) {
   api.on_reconstructed_frame = [](const v1::FrameRequest& request) {
     if (request.frame() != 12) return std::shared_ptr<const v1::IterationPreview>();

@@ -263,6 +263,23 @@ TEST_F(ServerHttpTest, AJobThatFailsOnItsWayEndsItsStreamWithTheError) {
   }
 }
 
+TEST_F(ServerHttpTest, AStepOfAStylizationComesWithItsPictureInBase64) {
+  api.on_edit_reconstruction = [](const v1::EditRequest& request) -> Result<v1::StylizationStatus> {
+    if (request.picture() != "voxels") return Error{ErrorKind::bad_input, "is missing", "step: picture"};
+    v1::StylizationStatus status;
+    status.set_steps(1);
+    return status;
+  };
+  serve();
+  const std::string path = "/api/v1/Reconstruct/Edit";
+  const auto taken = ask(port, "POST", path, R"({"operation": "{}", "picture": "dm94ZWxz"})");
+  EXPECT_EQ(json::parse(taken.body)["steps"], 1);
+  const auto refused = ask(port, "POST", path, R"({"operation": "{}"})");
+  EXPECT_EQ(refused.status, 400);
+  EXPECT_EQ(json::parse(refused.body)["message"], "step: picture: is missing");
+  EXPECT_EQ(ask(port, "POST", "/api/v1/Reconstruct/Finish", "{}").status, 200);
+}
+
 TEST_F(ServerHttpTest, AFrameThatIsNotHeldIsNotFound) {
   api.on_reconstructed_frame = [](const v1::FrameRequest& request) {
     if (request.frame() != 12) return std::shared_ptr<const v1::IterationPreview>();
@@ -277,6 +294,31 @@ TEST_F(ServerHttpTest, AFrameThatIsNotHeldIsNotFound) {
   const auto absent = ask(port, "POST", "/api/v1/Reconstruct/Frame", R"({"frame": "13"})");
   EXPECT_EQ(absent.status, 404);
   EXPECT_EQ(json::parse(absent.body)["code"], "NOT_FOUND");
+}
+
+TEST_F(ServerHttpTest, AFlameOnAMarkerIsAskedForByNames) {
+  api.on_list_results = [] {
+    v1::ListResultsResponse listed;
+    listed.add_results()->set_session("candle");
+    return Result<v1::ListResultsResponse>(listed);
+  };
+  api.on_start_ar = [](const v1::ArRequest& request) -> Result<v1::ArStatus> {
+    if (request.session() != "candle")
+      return Error{ErrorKind::bad_input, "there is no such result", request.session()};
+    v1::ArStatus status;
+    status.set_state(v1::ArStatus::SHOWN);
+    return status;
+  };
+  api.on_stop_ar = [] {
+    return Result<v1::ArStatus>(Error{ErrorKind::refused, "none is shown", "the flame"});
+  };
+  serve();
+  EXPECT_EQ(ask(port, "POST", "/api/v1/Ar/Results", "{}").body, R"({"results":[{"session":"candle"}]})");
+  EXPECT_EQ(ask(port, "POST", "/api/v1/Ar/Start", R"({"session": "candle"})").body, R"({"state":"SHOWN"})");
+  EXPECT_EQ(ask(port, "POST", "/api/v1/Ar/Start", R"({"session": "../candle"})").status, 400);
+  EXPECT_EQ(ask(port, "POST", "/api/v1/Ar/Start", R"({"path": "/etc"})").status, 400)
+      << "there is no such field";
+  EXPECT_EQ(ask(port, "POST", "/api/v1/Ar/Stop", "{}").status, 409);
 }
 
 TEST_F(ServerHttpTest, AJobIsCancelledByItsNumberAndSaysSo) {

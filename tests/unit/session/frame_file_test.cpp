@@ -10,6 +10,7 @@
 #include <opencv2/core.hpp>
 #include <opencv2/imgcodecs.hpp>
 
+#include "session/media/frame_decoders.h"
 #include "session/segment.h"
 #include "tests/support/recording.h"
 
@@ -144,6 +145,20 @@ TEST(FrameFile, HugeOrSenselessSizesAreRefusedBeforeMemoryIsAsked) {
   png[16] = 0x7f;  // the width's highest byte
   put_bytes(temp / "a.png", png);
   EXPECT_NE(read_image(temp / "a.png").error().message().find("16384"), std::string::npos);
+}
+
+TEST(FrameFile, APicturesSizeIsKnownBeforeItIsDecoded) {
+  const TempFolder temp;
+  for (const char* name : {"a.png", "a.jpg"}) {
+    ASSERT_TRUE(cv::imwrite((temp / name).string(), cv::Mat::zeros(5, 7, CV_8U)));
+    const std::string bytes = test::bytes_of(temp / name);
+    const auto size = picture_size(bytes, name);
+    ASSERT_TRUE(size) << size.error().message();
+    EXPECT_EQ(*size, (ImageSize{7, 5}));
+    EXPECT_FALSE(picture_size(bytes.substr(0, bytes.size() / 2), name));
+  }
+  EXPECT_FALSE(picture_size(pgm("P5 4 4 255\n", 16), "a.pgm")) << "neither";
+  EXPECT_FALSE(picture_size("", "empty"));
 }
 
 /// A FITS file of 3 x 2 pixels by cfitsio itself; `values` in file order.

@@ -77,7 +77,9 @@ const char* words_of(session::Backup::Outcome outcome) {
   return "";
 }
 
-void tell_of(const std::string& name, const std::string& words) { std::printf("%-24s %s\n", name.c_str(), words.c_str()); }
+void tell_of(const std::string& name, const std::string& words) {
+  std::printf("%-24s %s\n", name.c_str(), words.c_str());
+}
 
 void tell_of_error(const std::string& name, const Error& error) {
   std::fflush(stdout);
@@ -132,8 +134,9 @@ void prune(const BackupArguments& a) {
     const std::string name = folder.filename().string();
     const std::uint64_t bytes = session::bytes_below(folder);
     const double days = days_since(last_written(folder));
-    const Status done = a.yes ? session::remove_backed_up(folder, a.backups, watched(name))
-                              : session::compare_copy(folder, fs::path(a.backups) / name, session::Compare::times);
+    const Status done =
+        a.yes ? session::remove_backed_up(folder, a.backups, watched(name))
+              : session::compare_copy(folder, fs::path(a.backups) / name, session::Compare::times);
     if (!done) {
       ++failed;
       tell_of_error(name, done.error());
@@ -142,8 +145,8 @@ void prune(const BackupArguments& a) {
     }
     ++gone;
     if (!a.yes) freed += bytes;
-    tell_of(name, fmt::format("{} {:.1f} MB, written {:.0f} days ago", a.yes ? "removed" : "would go:",
-                              static_cast<double>(bytes) / 1e6, days));
+    tell_of(name, fmt::format("{} {:.1f} MB, written {:.0f} days ago",
+                              a.yes ? "removed" : "would go:", static_cast<double>(bytes) / 1e6, days));
   }
   if (gone == 0 && failed == 0) std::printf("Nothing to remove.\n");
   if (gone > 0 && !a.yes) std::printf("Nothing was removed: --yes does it.\n");
@@ -156,22 +159,28 @@ void add_sessions_backup(CLI::App& sessions) {
   auto a = std::make_shared<BackupArguments>();
   CLI::App* copy = sessions.add_subcommand(
       "backup",
-      "Copies finished sessions to another folder, such as one on another disk: each appears there when it is whole, on the disk "
+      "Copies finished sessions to another folder, such as one on another disk: each appears there when it "
+      "is whole, on the disk "
       "and read back. Those that are there already are left as they are; one that changed is copied anew.");
   copy->add_option("FOLDER", a->folder, "A session, or the folder in which sessions lie")->required();
   copy->add_option("--to", a->backups, "Folder of the copies; made if it isn't there")->required();
-  copy->add_flag("--compare", a->compare, "Read the copies that are there and compare each byte [sizes and times]");
+  copy->add_flag("--compare", a->compare,
+                 "Read the copies that are there and compare each byte [sizes and times]");
   copy->callback([a] { backup(*a); });
-  CLI::App* prune_verb = sessions.add_subcommand(
-      "prune",
-      "Removes the sessions that are the oldest on this machine and have a copy that is the same, byte for byte. Says what it "
-      "would remove; --yes removes it.");
+  CLI::App* prune_verb =
+      sessions.add_subcommand("prune",
+                              "Removes the sessions that are the oldest on this machine and have a copy that "
+                              "is the same, byte for byte. Says what it "
+                              "would remove; --yes removes it.");
   prune_verb->add_option("FOLDER", a->folder, "The folder in which sessions lie")->required();
-  prune_verb->add_option("--backups", a->backups, "Folder of the copies, as `backup --to` made them")->required();
+  prune_verb->add_option("--backups", a->backups, "Folder of the copies, as `backup --to` made them")
+      ->required();
   auto* why = prune_verb->add_option_group("which", "Which go");
-  why->add_option("--older-than", a->older_than_days, "DAYS: those to which nothing has been written for so long")
+  why->add_option("--older-than", a->older_than_days,
+                  "DAYS: those to which nothing has been written for so long")
       ->check(CLI::NonNegativeNumber);
-  why->add_option("--free", a->free_gb, "GB: the oldest, until so much is free where they lie")->check(CLI::NonNegativeNumber);
+  why->add_option("--free", a->free_gb, "GB: the oldest, until so much is free where they lie")
+      ->check(CLI::NonNegativeNumber);
   why->require_option(1);
   prune_verb->add_flag("--yes", a->yes, "Remove them");
   prune_verb->callback([a] { prune(*a); });

@@ -71,7 +71,9 @@ Result<Files> files_in(const fs::path& folder) {
   return found;
 }
 
-std::int64_t nanoseconds(const timespec& time) { return std::int64_t{time.tv_sec} * 1'000'000'000 + time.tv_nsec; }
+std::int64_t nanoseconds(const timespec& time) {
+  return std::int64_t{time.tv_sec} * 1'000'000'000 + time.tv_nsec;
+}
 
 bool times_agree(const FileFacts& a, const FileFacts& b) {
   return a.bytes == b.bytes && std::abs(nanoseconds(a.modified) - nanoseconds(b.modified)) < kTimesAgreeNs;
@@ -99,10 +101,12 @@ Result<std::string_view> read_next(const UniqueFd& fd, std::string& buffer, cons
 /// Bytes that have been handled, of those that have to be.
 class Tally {
  public:
-  Tally(std::uint64_t all, const Observer& observer) : all_(std::max<std::uint64_t>(all, 1)), observer_(observer) {}
+  Tally(std::uint64_t all, const Observer& observer)
+      : all_(std::max<std::uint64_t>(all, 1)), observer_(observer) {}
   Status add(std::uint64_t bytes, std::string_view what) {
     done_ += bytes;
-    return observe(observer_, std::min(kNearlyDone, static_cast<double>(done_) / static_cast<double>(all_)), what);
+    return observe(observer_, std::min(kNearlyDone, static_cast<double>(done_) / static_cast<double>(all_)),
+                   what);
   }
 
  private:
@@ -143,8 +147,8 @@ class FileCopier {
       if (left != right) {
         const auto same = static_cast<std::uint64_t>(
             std::mismatch(left.begin(), left.end(), right.begin(), right.end()).first - left.begin());
-        return Error{ErrorKind::bad_input, fmt::format("differs from {} at byte {}", from.string(), at + same),
-                     to.string()};
+        return Error{ErrorKind::bad_input,
+                     fmt::format("differs from {} at byte {}", from.string(), at + same), to.string()};
       }
       if (left.empty()) return {};
       at += left.size();
@@ -166,9 +170,11 @@ Result<UniqueFd> hold(const fs::path& folder, int operation) {
   const bool writing = events && ::flock(events.get(), operation | LOCK_NB) != 0;
   if (writing && errno != EWOULDBLOCK) return errno_error(events_path(folder), "cannot lock");
   if (writing)
-    return Error{ErrorKind::refused, "another process writes it", folder.string(), "Wait until that has ended"};
+    return Error{ErrorKind::refused, "another process writes it", folder.string(),
+                 "Wait until that has ended"};
   if (manifest.state() == v1::Manifest::RECORDING)
-    return Error{ErrorKind::refused, "its recording didn't end", folder.string(), "`emberlock sessions repair` ends it"};
+    return Error{ErrorKind::refused, "its recording didn't end", folder.string(),
+                 "`emberlock sessions repair` ends it"};
   return events;
 }
 
@@ -226,14 +232,15 @@ Status compare_copy(const fs::path& folder, const fs::path& copy, Compare compar
     const auto found = there.files.find(path);
     if (found == there.files.end())
       return Error{ErrorKind::bad_input, "isn't in " + copy.string(), (folder / path).string()};
-    const bool agrees = compare == Compare::times ? times_agree(facts, found->second)
-                                                  : facts.bytes == found->second.bytes;
+    const bool agrees =
+        compare == Compare::times ? times_agree(facts, found->second) : facts.bytes == found->second.bytes;
     if (!agrees)
-      return Error{ErrorKind::bad_input,
-                   facts.bytes == found->second.bytes ? "is of another time than in " + folder.string()
-                                                      : fmt::format("has {} bytes, in {} {}", found->second.bytes,
-                                                                    folder.string(), facts.bytes),
-                   (copy / path).string()};
+      return Error{
+          ErrorKind::bad_input,
+          facts.bytes == found->second.bytes
+              ? "is of another time than in " + folder.string()
+              : fmt::format("has {} bytes, in {} {}", found->second.bytes, folder.string(), facts.bytes),
+          (copy / path).string()};
   }
   if (compare == Compare::times) return {};
   Tally tally(wanted.bytes(), observer);
@@ -264,14 +271,16 @@ Result<Backup> back_up_session(const fs::path& folder, const fs::path& backups, 
     if (!check.whole())
       return Error{ErrorKind::refused, "is damaged, and its copy is another one: " + same.error().message(),
                    from.string(),
-                   "`emberlock sessions verify` says of each which is the better one; move the copy away if that is this one"};
+                   "`emberlock sessions verify` says of each which is the better one; move the copy away if "
+                   "that is this one"};
     backup.outcome = Backup::Outcome::renewed;
   }
   fs::create_directories(partial, ec);
   if (ec) return Error{ErrorKind::io, "cannot be created: " + ec.message(), partial.string()};
   EMBERLOCK_ASSIGN_OR_RETURN(const UniqueFd alone, open_to_read(partial));
   if (::flock(alone.get(), LOCK_EX | LOCK_NB) != 0)
-    return Error{ErrorKind::refused, "another process makes this copy", partial.string(), "Wait until that has ended"};
+    return Error{ErrorKind::refused, "another process makes this copy", partial.string(),
+                 "Wait until that has ended"};
   const Observer rest = part_of(observer, backup.outcome == Backup::Outcome::renewed ? 0.6 : 0, 1);
   Tally tally(2 * backup.bytes, rest);
   EMBERLOCK_RETURN_IF_ERROR(copy_missing(from, wanted, partial, tally));
@@ -287,7 +296,8 @@ Status remove_backed_up(const fs::path& folder, const fs::path& backups, const O
   EMBERLOCK_RETURN_IF_ERROR(check_apart(copy, {from}));
   std::error_code ec;
   if (!fs::exists(copy, ec))
-    return Error{ErrorKind::bad_input, "has no copy in " + backups.string(), from.string(), "`emberlock sessions backup` makes one"};
+    return Error{ErrorKind::bad_input, "has no copy in " + backups.string(), from.string(),
+                 "`emberlock sessions backup` makes one"};
   EMBERLOCK_RETURN_IF_ERROR(compare_copy(from, copy, Compare::bytes, observer));
   const fs::path removed = from.parent_path() / (std::string(kRemovedPrefix) + from.filename().string());
   fs::rename(from, removed, ec);

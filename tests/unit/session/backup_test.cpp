@@ -44,7 +44,8 @@ struct Store {
     std::sort(found.begin(), found.end());
     return found;
   }
-  [[nodiscard]] Result<Backup> back_up(Compare compare = Compare::times, const Observer& observer = {}) const {
+  [[nodiscard]] Result<Backup> back_up(Compare compare = Compare::times,
+                                       const Observer& observer = {}) const {
     return back_up_session(session, backups, compare, observer);
   }
   void back_up_well(Backup::Outcome outcome) const {
@@ -132,7 +133,8 @@ TEST(SessionBackup, ACopyThatRottedIsFoundByReadingAndRenewed) {
 TEST(SessionBackup, ARecordingThatGoesOnIsRefused) {
   const Store store;
   const fs::path session = store.temp / "sessions/take 2";
-  auto writer = SessionWriter::create(session, test::manifest_of({kBackedUpLayout}), test::small_disk_options());
+  auto writer =
+      SessionWriter::create(session, test::manifest_of({kBackedUpLayout}), test::small_disk_options());
   ASSERT_TRUE(writer);
   const auto held = back_up_session(session, store.backups, Compare::times);
   ASSERT_FALSE(held);

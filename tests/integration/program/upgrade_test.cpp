@@ -12,7 +12,7 @@
 namespace emberlock {
 namespace {
 
-TEST(UpgradePipeline, ASessionOfTheFirstVersionIsReconstructed) {
+TEST(UpgradeProgram, ASessionOfTheFirstVersionIsReconstructed) {
   const test::TempFolder temp;
   const Shell done = shell(std::string(EMBERLOCK_PROGRAM) +
                            " reconstruct " EMBERLOCK_SOURCE_DIR

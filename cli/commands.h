@@ -14,6 +14,8 @@ void add_clips(CLI::App& devices);
 void add_smear(CLI::App& app);
 void add_align(CLI::App& app);
 void add_reconstruct(CLI::App& app);
+/// `batch`, `batch submit` and `batch status`.
+void add_batch(CLI::App& app);
 void add_verify(CLI::App& app);
 void add_view(CLI::App& app);
 void add_measure(CLI::App& app);

@@ -38,6 +38,11 @@ using report::SequenceTold;
 
 constexpr const char* kTold = "frames.json";
 
+std::size_t failed(const SequenceTold& told) {
+  return static_cast<std::size_t>(std::count_if(told.frames.begin(), told.frames.end(),
+                                                [](const SequenceFrame& f) { return !f.error.empty(); }));
+}
+
 /// The views whose change over time is looked at: those held out, else the input ones.
 std::vector<std::size_t> looked_at(const recon::Scene& scene) {
   std::vector<std::size_t> views;
@@ -51,29 +56,29 @@ std::vector<std::size_t> looked_at(const recon::Scene& scene) {
 
 class FramesInTurn {
  public:
-  FramesInTurn(const ReconstructArguments& arguments, const std::vector<std::uint64_t>& frames)
-      : arguments_(arguments), frames_(frames), out_(arguments.out) {
-    arguments_.recording = std::make_shared<recon::SharedRecording>();
+  FramesInTurn(const ReconstructArguments& arguments, const std::vector<std::uint64_t>& frames,
+               const SequenceWatch& watch)
+      : arguments_(arguments), frames_(frames), watch_(watch), out_(arguments.out) {
+    if (!arguments_.recording) arguments_.recording = std::make_shared<recon::SharedRecording>();
   }
 
-  Status run() {
+  Result<SequenceTold> run() {
     std::error_code ec;
     EMBERLOCK_ASSIGN_OR_RETURN(const MadeFolders parents, MadeFolders::create(fs::absolute(out_, ec)));
     EMBERLOCK_RETURN_IF_ERROR(OutputFolder::check(request()));
     EMBERLOCK_RETURN_IF_ERROR(take_up());
-    for (; at_ < frames_.size() && !Interrupt::asked() && !hopeless(); ++at_) {
+    for (; at_ < frames_.size() && !watch_.stop() && !hopeless(); ++at_) {
       const bool tried = at_ < told_.frames.size();
       if (tried && told_.frames[at_].error.empty())
         continue;  // of an earlier run, and still what it would be
       EMBERLOCK_RETURN_IF_ERROR(go_on_behind_those_done());
-      std::fprintf(stderr, "%s%s\n", label().c_str(), tried ? ", which failed before" : "");
-      const std::optional<Status> done = reconstruct(frames_[at_]);
+      watch_.say(label() + (tried ? ", which failed before" : ""));
+      EMBERLOCK_ASSIGN_OR_RETURN(const std::optional<Status> done, reconstruct(frames_[at_]));
       if (!done) break;  // ended early: half a frame is none, and done again
       EMBERLOCK_RETURN_IF_ERROR(write());
-      if (!done->ok())
-        std::fprintf(stderr, "emberlock: %s: %s\n", label().c_str(), done->error().message().c_str());
+      if (!done->ok()) watch_.say(fmt::format("emberlock: {}: {}", label(), done->error().message()));
     }
-    return conclude();
+    return told_;
   }
 
  private:
@@ -84,14 +89,6 @@ class FramesInTurn {
   [[nodiscard]] std::string label() const {
     return fmt::format("frame {} ({} of {})", frames_[at_], at_ + 1, frames_.size());
   }
-  [[nodiscard]] std::size_t failed() const {
-    return static_cast<std::size_t>(std::count_if(told_.frames.begin(), told_.frames.end(),
-                                                  [](const SequenceFrame& f) { return !f.error.empty(); }));
-  }
-  [[nodiscard]] bool hopeless() const {
-    return failed() == told_.frames.size() && at_ >= session::kFailuresAtStart;
-  }
-
   [[nodiscard]] ReconstructArguments arguments_of(std::uint64_t frame) const {
     ReconstructArguments one = arguments_;
     one.frame = frame;
@@ -99,8 +96,13 @@ class FramesInTurn {
     return one;
   }
 
-  /// Nothing where it ended early.
-  std::optional<Status> reconstruct(std::uint64_t frame) {
+  [[nodiscard]] bool hopeless() const {
+    return failed(told_) == told_.frames.size() && at_ >= session::kFailuresAtStart;
+  }
+
+  /// What the frame came to; nothing where it ended early. Error: a volume that can't be written, which is
+  /// nothing of the frame's.
+  Result<std::optional<Status>> reconstruct(std::uint64_t frame) {
     SequenceFrame row;
     row.frame = frame;
     const auto solve = [&](const recon::Scene& scene, const recon::ReconstructOptions& options, const Clock&,
@@ -115,22 +117,23 @@ class FramesInTurn {
       return outcome;
     };
     const Result<Written> written =
-        reconstruct_files(arguments_of(frame), {progress_bar("reconstruct"), Interrupt::asked}, solve);
+        reconstruct_files(arguments_of(frame), {watch_.bar("reconstruct"), watch_.stop}, solve);
     if (!written) {
-      if (Interrupt::asked()) return std::nullopt;
+      if (watch_.stop()) return std::optional<Status>();
+      if (behind_ == frame) return written.error();
       row = {};
       row.frame = frame;
       row.error = written.error().message();
       keep(row);
-      return written.error();
+      return std::optional<Status>(written.error());
     }
     row.loading = written->loading;
     row.writing = written->writing;
-    if (written->outcome.report.stopped) return std::nullopt;
+    if (written->outcome.report.stopped) return std::optional<Status>();
     told_.voxels = written->outcome.report.voxel_choice.voxels;
     keep(row);
     EMBERLOCK_RETURN_IF_ERROR(link(frame));
-    return cli::conclude(*written, {arguments_.input, folder_of(frame).string(), arguments_.by_daemon.json});
+    return std::optional(watch_.tell(*written, folder_of(frame)));
   }
 
   /// Frames of an earlier run behind one that failed then hold as long as it fails; once it is a volume they
@@ -209,9 +212,8 @@ class FramesInTurn {
       return {};
     }
     if (behind_ == volumes.back()) return {};
-    std::fprintf(stderr, "%zu of %zu frames are done: going on behind frame %llu\n",
-                 told_.frames.size() - failed(), frames_.size(),
-                 static_cast<unsigned long long>(volumes.back()));
+    watch_.say(fmt::format("{} of {} frames are done: going on behind frame {}",
+                           told_.frames.size() - failed(told_), frames_.size(), volumes.back()));
     if (!sequence_ || deciding_ != deciding) {
       EMBERLOCK_RETURN_IF_ERROR(decide_again(deciding));
     }
@@ -237,8 +239,8 @@ class FramesInTurn {
     if (options.voxels && *options.voxels != told_.voxels)
       return another(fmt::format("was made with {} voxels", told_.voxels));
     options.voxels = told_.voxels;
-    options.solve.stop = Interrupt::asked;
-    const Progress progress = progress_bar(fmt::format("frame {} again", frame));
+    options.solve.stop = watch_.stop;
+    const Progress progress = watch_.bar(fmt::format("frame {} again", frame));
     EMBERLOCK_ASSIGN_OR_RETURN(const recon::Scene scene, load_views(anew, progress));
     sequence_.emplace(options, clock_);
     EMBERLOCK_ASSIGN_OR_RETURN(const recon::Outcome outcome, sequence_->next(scene, progress));
@@ -291,25 +293,9 @@ class FramesInTurn {
                  "Move what is there away, or give an --out on a file system that has symbolic links"};
   }
 
-  [[nodiscard]] Status conclude() const {
-    for (const std::string& words : report::sequence_words(told_))
-      std::fprintf(stderr, "%-16s %s\n", "sequence", words.c_str());
-    const std::size_t not_tried = frames_.size() - told_.frames.size();
-    if (failed() == 0 && not_tried == 0) {
-      std::fprintf(stderr, "%-16s %s\n", "look at", (request().target / "report.html").c_str());
-      return {};
-    }
-    return Error{
-        ErrorKind::refused,
-        fmt::format("of {} frames {} failed and {} were not tried", frames_.size(), failed(), not_tried),
-        out_.string(),
-        not_tried > 0 && !hopeless()
-            ? "The same command goes on where it ended, and tries again what failed"
-            : "Each of them is told above; where its cause is gone, the same command tries it again"};
-  }
-
   ReconstructArguments arguments_;
   const std::vector<std::uint64_t>& frames_;
+  const SequenceWatch& watch_;
   fs::path out_;
   SteadyClock clock_;
   std::optional<recon::FrameSequence> sequence_;
@@ -320,10 +306,39 @@ class FramesInTurn {
   std::size_t at_ = 0;                     ///< the frame that is looked at, of frames_
 };
 
+Status conclude(const SequenceTold& told, std::size_t frames, const fs::path& out) {
+  for (const std::string& words : report::sequence_words(told))
+    std::fprintf(stderr, "%-16s %s\n", "sequence", words.c_str());
+  const std::size_t not_tried = frames - told.frames.size();
+  if (failed(told) == 0 && not_tried == 0) {
+    std::fprintf(stderr, "%-16s %s\n", "look at", (out / "sequence" / "report.html").c_str());
+    return {};
+  }
+  const bool hopeless = failed(told) == told.frames.size() && told.frames.size() >= session::kFailuresAtStart;
+  return Error{ErrorKind::refused,
+               fmt::format("of {} frames {} failed and {} were not tried", frames, failed(told), not_tried),
+               out.string(),
+               not_tried > 0 && !hopeless
+                   ? "The same command goes on where it ended, and tries again what failed"
+                   : "Each of them is told above; where its cause is gone, the same command tries it again"};
+}
+
 }  // namespace
 
+Result<SequenceTold> frames_in_turn(const ReconstructArguments& arguments,
+                                    const std::vector<std::uint64_t>& frames, const SequenceWatch& watch) {
+  return FramesInTurn(arguments, frames, watch).run();
+}
+
 void reconstruct_in_turn(const ReconstructArguments& arguments, const std::vector<std::uint64_t>& frames) {
-  or_fail(FramesInTurn(arguments, frames).run());
+  const SequenceWatch watch{
+      Interrupt::asked, [](const std::string& words) { std::fprintf(stderr, "%s\n", words.c_str()); },
+      progress_bar,
+      [&](const Written& written, const fs::path& out) {
+        return cli::conclude(written, {arguments.input, out.string(), arguments.by_daemon.json});
+      }};
+  const SequenceTold told = or_fail(frames_in_turn(arguments, frames, watch));
+  or_fail(conclude(told, frames.size(), arguments.out));
 }
 
 }  // namespace emberlock::cli

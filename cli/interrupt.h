@@ -12,14 +12,20 @@ namespace emberlock::cli {
 /// the second it counts once. Only one at a time.
 class Interrupt {
  public:
-  Interrupt() {
+  enum class Heeds {
+    ctrl_c,           ///< SIGINT
+    termination_too,  ///< and SIGTERM, by which mpirun and Slurm end what they started
+  };
+  explicit Interrupt(Heeds heeds = Heeds::ctrl_c) : heeds_(heeds) {
     asked_at_ = 0;
     struct sigaction action {};
     action.sa_handler = ask;
     ::sigaction(SIGINT, &action, &before_);
+    if (heeds_ == Heeds::termination_too) ::sigaction(SIGTERM, &action, &before_termination_);
   }
   ~Interrupt() {
     ::sigaction(SIGINT, &before_, nullptr);
+    if (heeds_ == Heeds::termination_too) ::sigaction(SIGTERM, &before_termination_, nullptr);
     asked_at_ = 0;
   }
   Interrupt(const Interrupt&) = delete;
@@ -43,7 +49,9 @@ class Interrupt {
 
   static inline std::atomic<Clock::rep> asked_at_ = 0;
   static_assert(decltype(asked_at_)::is_always_lock_free, "a signal's handler sets it");
-  struct sigaction before_ {};
+  Heeds heeds_;
+  struct sigaction before_ {
+  }, before_termination_{};
 };
 
 }  // namespace emberlock::cli

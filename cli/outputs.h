@@ -13,6 +13,7 @@ namespace emberlock::cli {
 
 inline constexpr OutputVerb kPlan{"reconstruct --plan"};
 inline constexpr OutputVerb kSequence{"reconstruct --frames"};
+inline constexpr OutputVerb kBatch{"batch"};
 inline constexpr OutputVerb kTradeoffRecon{"tradeoff recon"};
 inline constexpr OutputVerb kTradeoffSync{"tradeoff sync"};
 inline constexpr OutputVerb kTradeoffRig{"tradeoff rig"};

@@ -202,36 +202,50 @@ void add_quantity_options(CLI::App* verb, ReconstructArguments& a) {
                  "ten views, and emission_noise and density_noise, what of it noise makes");
 }
 
-void add_picture_options(CLI::App* verb, ReconstructArguments& a) {
+void add_volume_options(CLI::App* verb, ReconstructArguments& a) {
   verb->add_option(
-          "--threshold", a.threshold,
-          "Grey level above which a pixel shows flame [each picture's noise; the paper's solver: 30]")
-      ->check(CLI::Range(0.0, 255.0));
-  verb->add_option("--frame", a.frame,
-                   "Sessions only: number of the first camera's frame [the middle one that all cameras have]")
-      ->check(CLI::NonNegativeNumber);
-  CLI::Option* last =
-      verb->add_option(
-              "--last-frame", a.last_frame,
-              "Sessions only: reconstructs each frame, from --frame to this one, each into "
-              "OUT/frame-N and started from where the one before ended, and tells of all over time in "
-              "OUT/sequence. The same command goes on where it was interrupted, and tries again what failed")
-          ->check(CLI::NonNegativeNumber)
-          ->needs("--frame");
+      "--rig", a.rig,
+      "Sessions only: rig.json of `calibrate cameras`, used instead of the session's calibration");
+  verb->add_option("--box", a.box,
+                   "cx,cy,cz,sx,sy,sz: the volume's centre and size in metres [the input's, or found]");
+  verb->add_option(
+      "--voxels", a.voxels,
+      "Voxels along the longest edge, 1 to 1024, or paper: two for three pixels [the knee of time "
+      "against error, measured on this machine; the paper's solver: two for three pixels, at most "
+      "256]");
+}
+
+void add_range_options(CLI::App* verb, ReconstructArguments& a) {
   verb->add_option_function<std::string>(
-          "--frames",
-          [&a](const std::string& text) {
-            const auto both = parse_frames(text);
-            if (!both) throw CLI::ValidationError("--frames", "give FIRST:LAST, two frames' numbers");
-            std::tie(a.frame, a.last_frame) = *both;
-            a.range = "--frames " + text;
-          },
-          "A:B: --frame A --last-frame B")
-      ->excludes("--frame")
-      ->excludes(last);
+      "--frames",
+      [&a](const std::string& text) {
+        const auto both = parse_frames(text);
+        if (!both) throw CLI::ValidationError("--frames", "give FIRST:LAST, two frames' numbers");
+        std::tie(a.frame, a.last_frame) = *both;
+        a.range = "--frames " + text;
+      },
+      "A:B: the session's frames from A to B, numbers of the first camera's");
   verb->add_option("--every", a.every, "With --frames: each frame of so many")
       ->check(CLI::Range(1, 1000000))
       ->capture_default_str();
+}
+
+void add_frame_options(CLI::App* verb, ReconstructArguments& a) {
+  verb->add_option("--frame", a.frame,
+                   "Sessions only: number of the first camera's frame [the middle one that all cameras have]")
+      ->check(CLI::NonNegativeNumber);
+  verb->add_option(
+          "--last-frame", a.last_frame,
+          "Sessions only: reconstructs each frame, from --frame to this one, each into "
+          "OUT/frame-N and started from where the one before ended, and tells of all over time in "
+          "OUT/sequence. The same command goes on where it was interrupted, and tries again what failed")
+      ->check(CLI::NonNegativeNumber)
+      ->needs("--frame");
+  add_range_options(verb, a);
+  verb->get_option("--frames")
+      ->description("A:B: --frame A --last-frame B")
+      ->excludes("--frame")
+      ->excludes("--last-frame");
   verb->add_flag("--cold", a.cold, "With --frames: each frame as if it were alone, from darkness");
   verb->add_option("--at-once", a.at_once,
                    "With --frames: so many frames at work, each as if it were alone, "
@@ -240,6 +254,13 @@ void add_picture_options(CLI::App* verb, ReconstructArguments& a) {
                    "sooner on many cores and on a GPU")
       ->check(CLI::Range(1, 64))
       ->capture_default_str();
+}
+
+void add_picture_options(CLI::App* verb, ReconstructArguments& a) {
+  verb->add_option(
+          "--threshold", a.threshold,
+          "Grey level above which a pixel shows flame [each picture's noise; the paper's solver: 30]")
+      ->check(CLI::Range(0.0, 255.0));
   verb->add_option("--shrink", a.shrink,
                    "Pictures of a so-and-so-many-th of their size, by means of pixels: where they are larger "
                    "than the voxels need")

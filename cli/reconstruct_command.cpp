@@ -181,20 +181,12 @@ void add_reconstruct(CLI::App& app) {
       "transforms.json (NeRF / instant-ngp convention), or a recorded session's folder; with --daemon a "
       "session's name");
   verb->add_option("--out", a.out, "Folder for volume.vdb, views/, report.json and the page report.html");
-  verb->add_option(
-      "--rig", a.rig,
-      "Sessions only: rig.json of `calibrate cameras`, used instead of the session's calibration");
   verb->add_option("--plan", a.plan,
                    "Reconstruct nothing; draw the box and the voxels on the pictures, in this folder, and "
                    "estimate the time of a run");
-  verb->add_option("--box", a.box,
-                   "cx,cy,cz,sx,sy,sz: the volume's centre and size in metres [the input's, or found]");
-  verb->add_option(
-      "--voxels", a.voxels,
-      "Voxels along the longest edge, 1 to 1024, or paper: two for three pixels [the knee of time "
-      "against error, measured on this machine; the paper's solver: two for three pixels, at most "
-      "256]");
+  add_volume_options(verb, a);
   add_solve_options(verb, a);
+  add_frame_options(verb, a);
   add_picture_options(verb, a);
   add_quantity_options(verb, a);
   verb->add_option("--seed", a.seed, "Seed of the random numbers in the paper's solver")

@@ -10,6 +10,7 @@
 #include "cli/commands.h"
 #include "cli/daemon_words.h"
 #include "cli/interrupt.h"
+#include "cli/sessions_backup.h"
 #include "cli/sessions_daemon.h"
 #include "session/export.h"
 #include "session/job_json.h"
@@ -207,7 +208,8 @@ CLI::App* add_verb(CLI::App& sessions, const char* name, const char* words,
 void add_sessions(CLI::App& app) {
   auto a = std::make_shared<SessionsArguments>();
   CLI::App* sessions = app.add_subcommand(
-      "sessions", "Lists, verifies, repairs and exports recordings: the daemon's by name, others by path.");
+      "sessions",
+      "Lists, verifies, repairs, exports and backs up recordings: the daemon's by name, others by path.");
   sessions->require_subcommand(1);
   CLI::App* all = sessions->add_subcommand("list", "Lists the sessions in a folder, the newest first.");
   all->add_option("FOLDER", a->folder, "Folder of sessions [the daemon's]");
@@ -228,6 +230,7 @@ void add_sessions(CLI::App& app) {
   out->add_option("--format", a->format, "png: images without loss; video: H.264, to look at")
       ->check(CLI::IsMember({"png", "video"}))
       ->capture_default_str();
+  add_sessions_backup(*sessions);
 }
 
 }  // namespace emberlock::cli

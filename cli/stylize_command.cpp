@@ -334,6 +334,7 @@ void add_stylize(CLI::App& app) {
   verb->add_option("--voxels", a.reconstruct.voxels,
                    "Along the longest edge [the edits', or as reconstruct]");
   add_solve_options(verb, a.reconstruct);
+  add_frame_options(verb, a.reconstruct);
   add_picture_options(verb, a.reconstruct);
   verb->callback([arguments] {
     if (arguments->reconstruct.last_frame)

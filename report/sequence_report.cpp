@@ -172,7 +172,8 @@ std::vector<std::string> sequence_words(const SequenceTold& told) {
   return words;
 }
 
-std::string sequence_html(const SequenceTold& told, const std::string& input) {
+std::string sequence_html(const SequenceTold& told, const std::string& input,
+                          const std::function<void(HtmlPage&)>& more) {
   HtmlPage page("Emberlock: a flame over time");
   page.paragraph("Reconstructed from " + input + ".");
   for (const std::string& words : sequence_words(told)) page.paragraph(sentence(words));
@@ -208,6 +209,7 @@ std::string sequence_html(const SequenceTold& told, const std::string& input) {
        {series("reconstruction", [](const SequenceFrame& f) { return f.reconstruction.value(); }),
         series("loading", [](const SequenceFrame& f) { return f.loading.value(); }),
         series("writing", [](const SequenceFrame& f) { return f.writing.value(); })});
+  if (more) more(page);
   std::vector<std::vector<std::string>> rows;
   for (const SequenceFrame& f : told.frames) {
     if (!f.error.empty())

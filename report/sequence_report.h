@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -10,6 +11,7 @@
 #include "base/quantity.h"
 #include "base/result.h"
 #include "recon/export/picture_quality.h"
+#include "report/html.h"
 
 namespace emberlock::report {
 
@@ -47,7 +49,8 @@ Result<SequenceTold> parse_sequence(std::string_view json, const std::string& wh
 std::string sequence_csv(const SequenceTold& told);
 /// What is said of all: volumes, seconds a frame, errors, flicker. Lines without ends.
 std::vector<std::string> sequence_words(const SequenceTold& told);
-/// A page with plots over time.
-std::string sequence_html(const SequenceTold& told, const std::string& input);
+/// A page with plots over time; `more` adds to it before the table of all frames.
+std::string sequence_html(const SequenceTold& told, const std::string& input,
+                          const std::function<void(HtmlPage&)>& more = {});
 
 }  // namespace emberlock::report

@@ -6,7 +6,7 @@
 namespace emberlock::session {
 
 Result<std::vector<std::uint64_t>> frames_of(const FrameRange& range, std::uint64_t recorded,
-                                             const std::string& where) {
+                                             const std::string& where, std::uint64_t most) {
   const auto bad = [&](std::string what, std::string remedy) {
     return Error{ErrorKind::bad_input, std::move(what), where, std::move(remedy)};
   };
@@ -19,10 +19,9 @@ Result<std::vector<std::uint64_t>> frames_of(const FrameRange& range, std::uint6
                recorded == 0 ? "Choose another session" : fmt::format("Choose among 0 to {}", recorded - 1));
   }
   const std::uint64_t steps = (range.last - range.first) / range.every;
-  if (steps >= kMostFramesOfSequence) {
+  if (steps >= most) {
     return bad(fmt::format("{} to {} are {} frames", range.first, range.last, steps + 1),
-               fmt::format("Choose at most {}: a shorter range, or each of so many frames only",
-                           kMostFramesOfSequence));
+               fmt::format("Choose at most {}: a shorter range, or each of so many frames only", most));
   }
   std::vector<std::uint64_t> frames;
   for (std::uint64_t i = 0; i <= steps; ++i) frames.push_back(range.first + i * range.every);

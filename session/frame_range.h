@@ -25,6 +25,7 @@ struct FrameRange {
 /// The range's frames, rising. Errors (bad_input, at `where`): it runs backwards, has too many frames, or
 /// leaves the recording, which has `recorded` frames.
 Result<std::vector<std::uint64_t>> frames_of(const FrameRange& range, std::uint64_t recorded,
-                                             const std::string& where);
+                                             const std::string& where,
+                                             std::uint64_t most = kMostFramesOfSequence);
 
 }  // namespace emberlock::session

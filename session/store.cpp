@@ -19,19 +19,6 @@ namespace emberlock::session {
 namespace fs = std::filesystem;
 namespace {
 
-/// Bytes of all files below `folder` whose size can be read.
-std::uint64_t bytes_below(const fs::path& folder) {
-  std::uint64_t bytes = 0;
-  std::error_code ec;
-  for (fs::recursive_directory_iterator at(folder, fs::directory_options::skip_permission_denied, ec), end;
-       !ec && at != end; at.increment(ec)) {
-    std::error_code unknown;
-    const std::uintmax_t size = at->is_regular_file(unknown) ? at->file_size(unknown) : 0;
-    if (!unknown) bytes += size;
-  }
-  return bytes;
-}
-
 /// For an unfinished recording, whose frames are counted in its index, not in its manifest.
 std::uint64_t frames_in_index(const fs::path& folder, const std::string& camera_id) {
   std::error_code ec;
@@ -101,6 +88,18 @@ std::string name_of_time(TimePoint wall_clock) {
 }
 
 }  // namespace
+
+std::uint64_t bytes_below(const fs::path& folder) {
+  std::uint64_t bytes = 0;
+  std::error_code ec;
+  for (fs::recursive_directory_iterator at(folder, fs::directory_options::skip_permission_denied, ec), end;
+       !ec && at != end; at.increment(ec)) {
+    std::error_code unknown;
+    const std::uintmax_t size = at->is_regular_file(unknown) ? at->file_size(unknown) : 0;
+    if (!unknown) bytes += size;
+  }
+  return bytes;
+}
 
 Result<SessionStore> SessionStore::open(fs::path folder, StoreOptions options) {
   if (!folder.has_filename()) folder = folder.parent_path();  // a trailing slash

@@ -21,6 +21,9 @@ struct StoreOptions {
       WriterOptions{}.min_free_bytes;  ///< below this much free space frames are refused
 };
 
+/// Bytes of all files below `folder` whose size can be read.
+std::uint64_t bytes_below(const std::filesystem::path& folder);
+
 /// The folder that holds all sessions, one folder each. Thread-safe.
 class SessionStore {
  public:

@@ -18,6 +18,8 @@
 #include <openvdb/openvdb.h>
 #pragma GCC diagnostic pop
 
+#include "recon/export/vdb_identity.h"
+
 namespace emberlock::recon {
 namespace {
 
@@ -147,6 +149,7 @@ Status write_file(const openvdb::GridPtrVec& grids, const openvdb::MetaMap& abou
   behind.exceptions(std::ios::failbit | std::ios::badbit);
   behind << end;
   behind.close();
+  identify_by_content(path);
   return {};
 } catch (const std::bad_alloc&) {
   throw;  // of memory, not of the disk

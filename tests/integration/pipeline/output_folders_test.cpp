@@ -311,8 +311,11 @@ class OutputFolders : public testing::Test {
 
 /// Every option of every verb that names a folder to write to, as the tables above have it.
 TEST_F(OutputFolders, TheTablesHoldEveryVerbThatWritesOne) {
-  std::set<std::string> listed{"emberlock devices clips --out",    // needs a camera: tests/vm/ptp
-                               "emberlock evaluate paper --out"};  // several in it: evaluate_paper_test.cpp
+  std::set<std::string> listed{
+      "emberlock devices clips --out",    // needs a camera: tests/vm/ptp
+      "emberlock batch --out",            // goes on with what is there: tests/integration/batch
+      "emberlock batch submit --out",     // the same
+      "emberlock evaluate paper --out"};  // several in it: evaluate_paper_test.cpp
   for (const std::vector<Writer>& writers : {replacing(), founding()}) {
     for (const Writer& writer : writers) {
       if (*writer.option == '\0') continue;
@@ -325,7 +328,7 @@ TEST_F(OutputFolders, TheTablesHoldEveryVerbThatWritesOne) {
        {add_devices, add_smear,    add_align,  add_reconstruct, add_verify,  add_tradeoff, add_calibrate,
         add_import,  add_demo,     add_sample, add_doctor,      add_bench,   add_sessions, add_status,
         add_jobs,    add_watch,    add_record, add_strobe,      add_measure, add_simulate, add_render,
-        add_export,  add_evaluate, add_scene,  add_ar,          add_stylize})
+        add_export,  add_evaluate, add_scene,  add_ar,          add_stylize, add_batch})
     add(app);
   std::set<std::string> found;
   cli::visit(app, "emberlock", [&](const CLI::App& verb, const std::string& path) {

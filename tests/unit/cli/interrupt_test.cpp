@@ -55,5 +55,18 @@ TEST(Interrupt, TheHandlerThatWasThereIsPutBack) {
   EXPECT_EQ(after.sa_handler, before.sa_handler);
 }
 
+TEST(Interrupt, HeedsTerminationWhereItWasToldTo) {
+  struct sigaction before {
+  }, after{};
+  ASSERT_EQ(::sigaction(SIGTERM, nullptr, &before), 0);
+  {
+    const Interrupt interrupt(Interrupt::Heeds::termination_too);
+    ASSERT_EQ(std::raise(SIGTERM), 0);
+    EXPECT_TRUE(Interrupt::asked());
+  }
+  ASSERT_EQ(::sigaction(SIGTERM, nullptr, &after), 0);
+  EXPECT_EQ(after.sa_handler, before.sa_handler);
+}
+
 }  // namespace
 }  // namespace emberlock::cli

@@ -11,6 +11,7 @@
 #include <gmock/gmock.h>
 
 #include "daemon/server/metrics.h"
+#include "tests/support/recording.h"
 
 namespace emberlock::daemon {
 namespace {
@@ -172,6 +173,41 @@ TEST(ServerMetrics, OfThisProcessTheSystemsCountsAreTold) {
   EXPECT_GT(usage.start_s, now - 86400);
   EXPECT_LE(usage.start_s, now + 1);
   EXPECT_GE(process_usage().cpu_s, usage.cpu_s);
+}
+
+// What the dashboard and the alerts ask for is what there is: a metric, with a value of its label where they
+// name one.
+TEST(ServerMetrics, DashboardAndAlertsAskForWhatThereIs) {
+  v1::DaemonStatus status = busy();
+  status.mutable_alignment()->set_time_left_s(60);
+  for (v1::CameraStatus& camera : *status.mutable_cameras()) {
+    camera.set_error_s(0);
+    camera.set_drift_ppm(1);
+  }
+  const std::map<std::string, double> samples =
+      parse(metrics_text(status, process_usage(), {.refused = {{"http", {}}}}));
+  std::set<std::string> families;
+  std::set<std::string> labels;
+  for (const auto& [sample, value] : samples) {
+    families.insert(sample.substr(0, sample.find('{')));
+    static const std::regex label(R"re((\w+)="([^"]*)")re");
+    for (std::sregex_iterator at(sample.begin(), sample.end(), label), end; at != end; ++at)
+      labels.insert((*at)[1].str() + "=" + (*at)[2].str());
+  }
+  for (const char* file : {"grafana.json", "alerts.yaml"}) {
+    const std::string text = test::bytes_of(std::string(EMBERLOCK_SOURCE_DIR "/daemon/system/") + file);
+    static const std::regex metric(R"(\b(emberlock_|process_)\w+)");
+    std::size_t asked = 0;
+    for (std::sregex_iterator at(text.begin(), text.end(), metric), end; at != end; ++at, ++asked)
+      EXPECT_TRUE(families.contains(at->str())) << file << " asks for " << at->str();
+    EXPECT_GT(asked, 5U) << file;
+    static const std::regex chosen(R"re((fate|state)\W*=~?\\?"([\w|]+))re");
+    for (std::sregex_iterator at(text.begin(), text.end(), chosen), end; at != end; ++at) {
+      std::istringstream values((*at)[2].str());
+      for (std::string value; std::getline(values, value, '|');)
+        EXPECT_TRUE(labels.contains((*at)[1].str() + "=" + value)) << file << " asks for " << at->str();
+    }
+  }
 }
 
 }  // namespace

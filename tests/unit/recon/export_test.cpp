@@ -8,6 +8,7 @@
 #include <nlohmann/json.hpp>
 #include <unistd.h>
 
+#include "base/file.h"
 #include "recon/export/picture.h"
 #include "recon/export/report.h"
 #include "recon/export/volume_file.h"
@@ -53,6 +54,20 @@ TEST_F(ExportTest, AVolumeIsReadBackToTheSameBits) {
   EXPECT_EQ(read->grid.nx, 5);
   EXPECT_EQ(read->grid.ny, 9);
   EXPECT_EQ(read->grid.nz, 3);
+}
+
+TEST_F(ExportTest, EqualVolumesAreEqualFilesAndUnequalOnesTellThemselvesApart) {
+  Volume volume = some_volume();
+  const auto written = [&](const char* name) {
+    EXPECT_TRUE(write_volume(volume, root_ / name).ok());
+    return read_file(root_ / name).value();
+  };
+  const std::string first = written("first.vdb");
+  EXPECT_EQ(written("again.vdb"), first);
+  volume.emission[3] += 1;
+  const std::string other = written("other.vdb");
+  EXPECT_NE(other.substr(21, 36), first.substr(21, 36)) << "OpenVDB's identifier";
+  EXPECT_THAT(first.substr(21, 36), testing::MatchesRegex("[0-9a-f]{8}(-[0-9a-f]{4}){3}-[0-9a-f]{12}"));
 }
 
 TEST_F(ExportTest, WithoutExtinctionTheDensityIsEmptyButThere) {

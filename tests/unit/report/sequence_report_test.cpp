@@ -6,6 +6,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "report/batch_report.h"
+
 namespace emberlock::report {
 namespace {
 
@@ -81,6 +83,42 @@ TEST(SequenceReport, ThePageAndTheTableHoldEachFrame) {
   EXPECT_THAT(csv, HasSubstr("\n40,\"darkness\",12,0.500,4.000,0.500,3.25,5.0625,30,0.9,0.000333333,,\n"));
   EXPECT_THAT(csv, HasSubstr("\n50,\"the frame before, carried on\",12,"));
   EXPECT_EQ(csv.find("\n45,"), std::string::npos);
+}
+
+/// Two chunks of three are done, by two ranks.
+BatchTold two_chunks() {
+  BatchTold told;
+  told.sequence = three_frames();
+  told.chunks = {{"0000040-0000050", 3, 2, 1, true, 1, "n2", "cuda", Seconds(7)},
+                 {"0000055-0000060", 2, 2, 0, true, 0, "n<1>", "cpu", Seconds(4)},
+                 {"0000065-0000070", 2, 0, 0, false}};
+  return told;
+}
+
+TEST(BatchReport, CountsFramesChunksAndRanks) {
+  BatchTold told = two_chunks();
+  EXPECT_EQ(told.planned(), 7U);
+  EXPECT_EQ(told.volumes(), 4U);
+  EXPECT_EQ(told.failed(), 1U);
+  EXPECT_THAT(batch_words(told),
+              testing::ElementsAre("4 of 7 frames are volumes, 1 failed; 2 of 3 chunks are "
+                                   "done, by 2 ranks"));
+  told.losses = {"0000040-0000050.n3-17-4"};
+  told.given_up = {"0000065-0000070"};
+  EXPECT_THAT(batch_words(told)[1], HasSubstr("n3-17-4"));
+  EXPECT_THAT(batch_words(told)[2], HasSubstr("given up"));
+}
+
+TEST(BatchReport, ThePageAndTheTableSayWhoDidWhat) {
+  EXPECT_EQ(batch_csv(two_chunks()),
+            "chunk,frames,volumes,failed,rank,host,device,seconds\n"
+            "0000040-0000050,3,2,1,1,n2,cuda,7.000\n"
+            "0000055-0000060,2,2,0,0,n<1>,cpu,4.000\n"
+            "0000065-0000070,2,,,,,,\n");
+  const std::string page = batch_html(two_chunks(), "take2");
+  EXPECT_THAT(page, HasSubstr("Who did what"));
+  EXPECT_THAT(page, HasSubstr("n&lt;1&gt;"));
+  EXPECT_THAT(page, HasSubstr("Frames</h2>")) << "of a sequence's page";
 }
 
 }  // namespace

@@ -1,0 +1,202 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+#include <cstdio>
+#include <cstdlib>
+#include <filesystem>
+#include <memory>
+#include <set>
+#include <string>
+#include <system_error>
+#include <utility>
+#include <vector>
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include "cli/batch_result.h"
+#include "cli/batch_run.h"
+#include "cli/batch_slurm.h"
+#include "cli/commands.h"
+#include "cli/reconstruct_arguments.h"
+#include "recon/batch/ledger.h"
+#include "recon/batch/plan.h"
+#include "recon/batch/pulse.h"
+#include "recon/batch/rank.h"
+
+namespace emberlock::cli {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// Options that say how a rank works, or are compared by themselves: results don't depend on them, but for
+/// the device, which ranks may have each of its own.
+const std::set<std::string>& of_a_run() {
+  static const std::set<std::string> names{"SESSION",   "--out",    "--frames",   "--every", "--chunk",
+                                           "--threads", "--device", "--patience", "--help"};
+  return names;
+}
+
+void add_batch_options(CLI::App* verb, BatchArguments& b) {
+  ReconstructArguments& a = b.reconstruct;
+  verb->add_option("SESSION", a.input, "A recorded session's folder");
+  add_range_options(verb, a);
+  verb->add_option("--out", a.out, "Folder for the volumes, on a file system that all ranks share");
+  verb->add_option("--chunk", b.chunk,
+                   "Frames that one rank does in turn, the first from darkness, each further one from where "
+                   "the one before ended [a 64th of all, 5 to 20]")
+      ->check(CLI::Range(1, 1000000));
+  verb->add_option("--patience", b.patience_s,
+                   "Seconds until a rank of another machine that isn't heard of counts as dead")
+      ->check(CLI::Range(1.0, 86400.0))
+      ->capture_default_str();
+  add_volume_options(verb, a);
+  add_solve_options(verb, a);
+  for (const char* name : {"--budget", "--target-rmse"})  // what a clock ends never repeats
+    verb->remove_option(verb->get_option(name));
+  add_picture_options(verb, a);
+  add_quantity_options(verb, a);
+  verb->add_option("--seed", a.seed, "Seed of the random numbers in the paper's solver")
+      ->check(CLI::NonNegativeNumber)
+      ->capture_default_str();
+}
+
+void check_given(const BatchArguments& b) {
+  if (b.reconstruct.input.empty()) throw CLI::RequiredError("SESSION");
+  if (!b.reconstruct.last_frame) throw CLI::RequiredError("--frames");
+  if (b.reconstruct.out.empty()) throw CLI::RequiredError("--out");
+}
+
+std::string absolute(const std::string& path) {
+  std::error_code ec;
+  return fs::absolute(path, ec).lexically_normal().string();
+}
+
+/// As it is meant in every folder.
+std::string value_of(const CLI::Option& option) {
+  static const std::set<std::string> kPaths{"--out", "--rig", "--response"};
+  const std::string value = fmt::format("{}", fmt::join(option.results(), ","));
+  return kPaths.contains(option.get_name()) ? absolute(value) : value;
+}
+
+std::map<std::string, std::string> given_to(const CLI::App& verb) {
+  std::map<std::string, std::string> given;
+  for (const CLI::Option* option : verb.get_options())
+    if (option->count() > 0 && !of_a_run().contains(option->get_name()))
+      given[option->get_name()] = value_of(*option);
+  return given;
+}
+
+// --- submit
+
+struct SubmitArguments {
+  BatchArguments batch;
+  SlurmJob job;
+};
+
+/// A rank's command line, which runs in another folder.
+std::vector<std::string> words_of(const SubmitArguments& s, const CLI::App& verb,
+                                  const std::set<std::string>& of_slurm) {
+  std::error_code ec;
+  std::vector<std::string> words{fs::read_symlink("/proc/self/exe", ec).string(), "batch",
+                                 absolute(s.batch.reconstruct.input)};
+  for (const CLI::Option* option : verb.get_options()) {
+    const std::string& name = option->get_name();
+    if (option->count() == 0 || name == "SESSION" || of_slurm.contains(name)) continue;
+    words.push_back(name);
+    if (option->get_items_expected_max() > 0) words.push_back(value_of(*option));  // else a flag
+  }
+  return words;
+}
+
+void submit_command(SubmitArguments& s, const CLI::App& verb) {
+  static const std::set<std::string> kOfSlurm{"--nodes", "--ranks", "--gpus", "--cpus", "--time", "--sbatch"};
+  check_given(s.batch);
+  s.batch.options = given_to(verb);
+  for (const std::string& name : kOfSlurm) s.batch.options.erase(name);
+  or_fail(asked_plan(s.batch));
+  const fs::path out = absolute(s.batch.reconstruct.out);
+  const std::vector<std::string> words = words_of(s, verb, kOfSlurm);
+  const std::string job = or_fail(submit(sbatch_script(s.job, words, out), out));
+  std::printf("%-16s %s\n", "job", job.c_str());
+  std::printf("%-16s emberlock batch status %s\n", "look at", out.c_str());
+}
+
+void add_submit(CLI::App& batch) {
+  auto arguments = std::make_shared<SubmitArguments>();
+  CLI::App* verb = batch.add_subcommand("submit", "Writes a script for Slurm's sbatch, and submits it");
+  add_batch_options(verb, arguments->batch);
+  SlurmJob& job = arguments->job;
+  verb->add_option("--nodes", job.nodes, "Machines")->check(CLI::Range(1, 100000))->capture_default_str();
+  verb->add_option("--ranks", job.ranks, "Ranks on each of them")
+      ->check(CLI::Range(1, 1024))
+      ->capture_default_str();
+  verb->add_option("--gpus", job.gpus, "GPUs of each of them: one a rank, ranks beyond them use the CPU")
+      ->check(CLI::Range(0, 1024))
+      ->capture_default_str();
+  verb->add_option("--cpus", job.cpus, "CPU threads of each rank [Slurm's rule]")->check(CLI::Range(1, 1024));
+  verb->add_option("--time", job.time, "Time limit, as sbatch takes it, such as 2:00:00 [the partition's]");
+  verb->add_option("--sbatch", job.further,
+                   "A further option of sbatch's, such as --sbatch=--partition=NAME; may be given again")
+      ->take_all();
+  verb->callback([arguments, verb] { submit_command(*arguments, *verb); });
+}
+
+// --- status
+
+void status_command(const std::string& folder) {
+  const fs::path out = folder;
+  const fs::path place = ledger_of(out);
+  const auto text = or_fail(recon::Ledger::read_plan(place));
+  const std::string state = [&] {
+    if (text) return std::string();
+    return or_fail(job_state(out));
+  }();
+  if (!text && state.empty())
+    fail({ErrorKind::bad_input, "holds no batch", folder, "Name the --out of `emberlock batch`"});
+  if (text) {
+    const recon::BatchPlan plan = or_fail(recon::parse_plan(*text, (place / "plan.json").string()));
+    std::vector<std::string> names;
+    for (const recon::Chunk& chunk : recon::chunks_of(plan)) names.push_back(chunk.name);
+    const recon::Ledger ledger(place, names, "");
+    for (const std::string& words : batch_words(or_fail(told_of(ledger, plan))))
+      std::printf("%-16s %s\n", "batch", words.c_str());
+    std::printf("%-16s %zu of %zu\n", "frames tried", frames_done(ledger, plan), plan.frames.size());
+    for (const auto& [name, worker] : recon::workers_in(place / "workers")) {
+      const auto runs = recon::runs_here(worker);
+      std::printf("%-16s %d on %s, %s%s\n", "rank", worker.rank, worker.host.c_str(), worker.device.c_str(),
+                  runs && !*runs ? ": has died" : "");
+    }
+  }
+  const std::string job = text ? or_fail(job_state(out)) : state;
+  if (!job.empty()) std::printf("%-16s %s\n", "job", job.c_str());
+}
+
+void add_batch_status(CLI::App& batch) {
+  auto folder = std::make_shared<std::string>();
+  CLI::App* verb =
+      batch.add_subcommand("status", "How far a batch is, who works on it, and what Slurm says of its job");
+  verb->add_option("DIR", *folder, "The batch's --out")->required();
+  verb->callback([folder] { status_command(*folder); });
+}
+
+}  // namespace
+
+void add_batch(CLI::App& app) {
+  auto arguments = std::make_shared<BatchArguments>();
+  CLI::App* verb = app.add_subcommand(
+      "batch",
+      "Reconstructs a session's frames on many ranks, which mpirun or Slurm starts; goes on where it ended");
+  add_batch_options(verb, *arguments);
+  add_submit(*verb);
+  add_batch_status(*verb);
+  verb->require_subcommand(0, 1);
+  verb->callback([arguments, verb] {
+    if (!verb->get_subcommands().empty()) return;
+    check_given(*arguments);
+    arguments->options = given_to(*verb);
+    run_batch_rank(*arguments,
+                   recon::rank_from([](const char* name) -> const char* { return std::getenv(name); }));
+  });
+}
+
+}  // namespace emberlock::cli

@@ -1,0 +1,318 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "session/backup.h"
+
+#include <algorithm>
+#include <cerrno>
+#include <chrono>
+#include <cstddef>
+#include <cstdio>
+#include <cstdlib>
+#include <map>
+#include <string>
+#include <string_view>
+#include <system_error>
+#include <utility>
+#include <vector>
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <sys/file.h>
+#include <sys/stat.h>
+
+#include "base/file.h"
+#include "base/output_folder.h"
+#include "base/unique_fd.h"
+#include "session/files.h"
+#include "session/verify.h"
+
+namespace emberlock::session {
+namespace fs = std::filesystem;
+namespace {
+
+constexpr const char* kPartialSuffix = ".partial";
+constexpr const char* kReplacedSuffix = ".replaced";
+constexpr std::string_view kRemovedPrefix = ".removed-";
+/// File systems that round times of modification round to 2 s at most (FAT).
+constexpr std::int64_t kTimesAgreeNs = 2'000'000'000;
+
+struct FileFacts {
+  std::uint64_t bytes = 0;
+  timespec modified{};
+};
+
+/// All files of a session or of its copy, by their path within it.
+struct Files {
+  std::map<std::string, FileFacts> files;
+  std::vector<fs::path> folders;  ///< below the outermost one, parents first
+  [[nodiscard]] std::uint64_t bytes() const {
+    std::uint64_t sum = 0;
+    for (const auto& [path, facts] : files) sum += facts.bytes;
+    return sum;
+  }
+};
+
+Result<Files> files_in(const fs::path& folder) {
+  Files found;
+  std::error_code ec;
+  for (fs::recursive_directory_iterator at(folder, ec), end; !ec && at != end; at.increment(ec)) {
+    struct stat info {};
+    if (::lstat(at->path().c_str(), &info) != 0) return errno_error(at->path(), "cannot be looked at");
+    const fs::path within = at->path().lexically_relative(folder);
+    if (S_ISDIR(info.st_mode)) {
+      found.folders.push_back(within);
+    } else if (S_ISREG(info.st_mode)) {
+      found.files[within.string()] = {static_cast<std::uint64_t>(info.st_size), info.st_mtim};
+    } else {
+      return Error{ErrorKind::bad_input, "is neither a file nor a folder, and a session holds only those",
+                   at->path().string(), "Move it away; of a link, put in its place what it leads to"};
+    }
+  }
+  if (ec) return Error{ErrorKind::io, "cannot be listed: " + ec.message(), folder.string()};
+  return found;
+}
+
+std::int64_t nanoseconds(const timespec& time) {
+  return std::int64_t{time.tv_sec} * 1'000'000'000 + time.tv_nsec;
+}
+
+bool times_agree(const FileFacts& a, const FileFacts& b) {
+  return a.bytes == b.bytes && std::abs(nanoseconds(a.modified) - nanoseconds(b.modified)) < kTimesAgreeNs;
+}
+
+Result<UniqueFd> open_to_read(const fs::path& path) {
+  UniqueFd fd(::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NOFOLLOW));
+  if (!fd) return errno_error(path, "cannot open");
+  return fd;
+}
+
+/// Reads until `buffer` is full or the file ends.
+Result<std::string_view> read_next(const UniqueFd& fd, std::string& buffer, const fs::path& path) {
+  std::size_t filled = 0;
+  while (filled < buffer.size()) {
+    const ssize_t n = ::read(fd.get(), buffer.data() + filled, buffer.size() - filled);
+    if (n < 0 && errno == EINTR) continue;
+    if (n < 0) return errno_error(path, "cannot read");
+    if (n == 0) break;
+    filled += static_cast<std::size_t>(n);
+  }
+  return std::string_view(buffer).substr(0, filled);
+}
+
+/// Bytes that have been handled, of those that have to be.
+class Tally {
+ public:
+  Tally(std::uint64_t all, const Observer& observer)
+      : all_(std::max<std::uint64_t>(all, 1)), observer_(observer) {}
+  Status add(std::uint64_t bytes, std::string_view what) {
+    done_ += bytes;
+    return observe(observer_, std::min(kNearlyDone, static_cast<double>(done_) / static_cast<double>(all_)),
+                   what);
+  }
+
+ private:
+  std::uint64_t all_;
+  std::uint64_t done_ = 0;
+  const Observer& observer_;
+};
+
+/// Copies and compares files through two buffers of its own.
+class FileCopier {
+ public:
+  Status copy(const fs::path& from, const fs::path& to, const FileFacts& facts, Tally& tally) {
+    EMBERLOCK_ASSIGN_OR_RETURN(const UniqueFd in, open_to_read(from));
+    const UniqueFd out(::open(to.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC | O_NOFOLLOW, 0644));
+    if (!out) return errno_error(to, "cannot open for writing");
+    for (;;) {
+      EMBERLOCK_ASSIGN_OR_RETURN(const std::string_view part, read_next(in, one_, from));
+      if (part.empty()) break;
+      EMBERLOCK_RETURN_IF_ERROR(write_fully(out.get(), part, to));
+      EMBERLOCK_RETURN_IF_ERROR(tally.add(part.size(), from.filename().string()));
+    }
+    if (::fsync(out.get()) != 0) return errno_error(to, "cannot be written to the disk");
+    // So that it is the disk that is read back.
+    (void)::posix_fadvise(out.get(), 0, 0, POSIX_FADV_DONTNEED);
+    EMBERLOCK_RETURN_IF_ERROR(compare(from, to, tally));
+    // Its time says that it is whole: last.
+    const timespec times[2] = {facts.modified, facts.modified};
+    if (::futimens(out.get(), times) != 0) return errno_error(to, "cannot be given its time");
+    return {};
+  }
+
+  Status compare(const fs::path& from, const fs::path& to, Tally& tally) {
+    EMBERLOCK_ASSIGN_OR_RETURN(const UniqueFd a, open_to_read(from));
+    EMBERLOCK_ASSIGN_OR_RETURN(const UniqueFd b, open_to_read(to));
+    for (std::uint64_t at = 0;;) {
+      EMBERLOCK_ASSIGN_OR_RETURN(const std::string_view left, read_next(a, one_, from));
+      EMBERLOCK_ASSIGN_OR_RETURN(const std::string_view right, read_next(b, other_, to));
+      if (left != right) {
+        const auto same = static_cast<std::uint64_t>(
+            std::mismatch(left.begin(), left.end(), right.begin(), right.end()).first - left.begin());
+        return Error{ErrorKind::bad_input,
+                     fmt::format("differs from {} at byte {}", from.string(), at + same), to.string()};
+      }
+      if (left.empty()) return {};
+      at += left.size();
+      EMBERLOCK_RETURN_IF_ERROR(tally.add(left.size(), from.filename().string()));
+    }
+  }
+
+ private:
+  static constexpr std::size_t kPart = std::size_t{1} << 20;
+  std::string one_ = std::string(kPart, '\0');
+  std::string other_ = std::string(kPart, '\0');
+};
+
+/// A finished session that nobody changes while this exists. `operation` is LOCK_SH or LOCK_EX.
+Result<UniqueFd> hold(const fs::path& folder, int operation) {
+  EMBERLOCK_ASSIGN_OR_RETURN(const v1::Manifest manifest, read_manifest(folder));
+  UniqueFd events(::open(events_path(folder).c_str(), O_RDONLY | O_CLOEXEC));
+  if (!events && errno != ENOENT) return errno_error(events_path(folder), "cannot open");
+  const bool writing = events && ::flock(events.get(), operation | LOCK_NB) != 0;
+  if (writing && errno != EWOULDBLOCK) return errno_error(events_path(folder), "cannot lock");
+  if (writing)
+    return Error{ErrorKind::refused, "another process writes it", folder.string(),
+                 "Wait until that has ended"};
+  if (manifest.state() == v1::Manifest::RECORDING)
+    return Error{ErrorKind::refused, "its recording didn't end", folder.string(),
+                 "`emberlock sessions repair` ends it"};
+  return events;
+}
+
+/// "NAME" of "sessions/NAME" and of "sessions/NAME/".
+fs::path named(const fs::path& folder) {
+  const fs::path whole = fs::absolute(folder).lexically_normal();
+  return whole.has_filename() ? whole : whole.parent_path();
+}
+
+Status copy_missing(const fs::path& from, const Files& wanted, const fs::path& to, Tally& tally) {
+  std::error_code ec;
+  for (const fs::path& folder : wanted.folders) {
+    fs::create_directory(to / folder, ec);
+    if (ec) return Error{ErrorKind::io, "cannot be created: " + ec.message(), (to / folder).string()};
+  }
+  EMBERLOCK_ASSIGN_OR_RETURN(const Files there, files_in(to));
+  for (const auto& [path, facts] : there.files)
+    if (!wanted.files.contains(path)) fs::remove(to / path, ec);
+  FileCopier copier;
+  for (const auto& [path, facts] : wanted.files) {
+    const auto earlier = there.files.find(path);
+    if (earlier != there.files.end() && times_agree(facts, earlier->second)) {
+      EMBERLOCK_RETURN_IF_ERROR(tally.add(2 * facts.bytes, path));
+      continue;
+    }
+    EMBERLOCK_RETURN_IF_ERROR(copier.copy(from / path, to / path, facts, tally));
+  }
+  for (const fs::path& folder : wanted.folders) EMBERLOCK_RETURN_IF_ERROR(sync_folder(to / folder));
+  return sync_folder(to);
+}
+
+/// Gives the complete copy its name; an earlier one goes only then.
+Status put_in_place(const fs::path& partial, const fs::path& copy, const fs::path& replaced) {
+  std::error_code ec;
+  if (fs::exists(copy, ec)) {
+    fs::remove_all(replaced, ec);
+    fs::rename(copy, replaced, ec);
+  }
+  if (!ec) fs::rename(partial, copy, ec);
+  if (ec) return Error{ErrorKind::io, "cannot be renamed: " + ec.message(), partial.string()};
+  EMBERLOCK_RETURN_IF_ERROR(sync_folder(copy.parent_path()));
+  fs::remove_all(replaced, ec);
+  return {};
+}
+
+}  // namespace
+
+Status compare_copy(const fs::path& folder, const fs::path& copy, Compare compare, const Observer& observer) {
+  EMBERLOCK_ASSIGN_OR_RETURN(const Files wanted, files_in(folder));
+  EMBERLOCK_ASSIGN_OR_RETURN(const Files there, files_in(copy));
+  for (const auto& [path, facts] : there.files)
+    if (!wanted.files.contains(path))
+      return Error{ErrorKind::bad_input, "isn't in " + folder.string(), (copy / path).string()};
+  for (const auto& [path, facts] : wanted.files) {
+    const auto found = there.files.find(path);
+    if (found == there.files.end())
+      return Error{ErrorKind::bad_input, "isn't in " + copy.string(), (folder / path).string()};
+    const bool agrees =
+        compare == Compare::times ? times_agree(facts, found->second) : facts.bytes == found->second.bytes;
+    if (!agrees)
+      return Error{
+          ErrorKind::bad_input,
+          facts.bytes == found->second.bytes
+              ? "is of another time than in " + folder.string()
+              : fmt::format("has {} bytes, in {} {}", found->second.bytes, folder.string(), facts.bytes),
+          (copy / path).string()};
+  }
+  if (compare == Compare::times) return {};
+  Tally tally(wanted.bytes(), observer);
+  FileCopier files;
+  for (const auto& [path, facts] : wanted.files)
+    EMBERLOCK_RETURN_IF_ERROR(files.compare(folder / path, copy / path, tally));
+  return {};
+}
+
+Result<Backup> back_up_session(const fs::path& folder, const fs::path& backups, Compare compare,
+                               const Observer& observer) {
+  const fs::path from = named(folder);
+  EMBERLOCK_ASSIGN_OR_RETURN(const UniqueFd held, hold(from, LOCK_SH));
+  EMBERLOCK_ASSIGN_OR_RETURN(const Files wanted, files_in(from));
+  const fs::path copy = named(backups) / from.filename();
+  EMBERLOCK_RETURN_IF_ERROR(check_apart(copy, {from}));
+  const fs::path partial = named(backups) / ("." + from.filename().string() + kPartialSuffix);
+  Backup backup{Backup::Outcome::copied, wanted.files.size(), wanted.bytes()};
+  std::error_code ec;
+  if (fs::exists(copy, ec)) {
+    const Status same = compare_copy(from, copy, compare, part_of(observer, 0, 0.3));
+    if (same) {
+      backup.outcome = Backup::Outcome::kept;
+      return backup;
+    }
+    if (same.error().kind != ErrorKind::bad_input) return same.error();
+    EMBERLOCK_ASSIGN_OR_RETURN(const SessionCheck check, verify_session(from, part_of(observer, 0.3, 0.6)));
+    if (!check.whole())
+      return Error{ErrorKind::refused, "is damaged, and its copy is another one: " + same.error().message(),
+                   from.string(),
+                   "`emberlock sessions verify` says of each which is the better one; move the copy away if "
+                   "that is this one"};
+    backup.outcome = Backup::Outcome::renewed;
+  }
+  fs::create_directories(partial, ec);
+  if (ec) return Error{ErrorKind::io, "cannot be created: " + ec.message(), partial.string()};
+  EMBERLOCK_ASSIGN_OR_RETURN(const UniqueFd alone, open_to_read(partial));
+  if (::flock(alone.get(), LOCK_EX | LOCK_NB) != 0)
+    return Error{ErrorKind::refused, "another process makes this copy", partial.string(),
+                 "Wait until that has ended"};
+  const Observer rest = part_of(observer, backup.outcome == Backup::Outcome::renewed ? 0.6 : 0, 1);
+  Tally tally(2 * backup.bytes, rest);
+  EMBERLOCK_RETURN_IF_ERROR(copy_missing(from, wanted, partial, tally));
+  EMBERLOCK_RETURN_IF_ERROR(
+      put_in_place(partial, copy, named(backups) / ("." + from.filename().string() + kReplacedSuffix)));
+  return backup;
+}
+
+Status remove_backed_up(const fs::path& folder, const fs::path& backups, const Observer& observer) {
+  const fs::path from = named(folder);
+  EMBERLOCK_ASSIGN_OR_RETURN(const UniqueFd held, hold(from, LOCK_EX));
+  const fs::path copy = named(backups) / from.filename();
+  EMBERLOCK_RETURN_IF_ERROR(check_apart(copy, {from}));
+  std::error_code ec;
+  if (!fs::exists(copy, ec))
+    return Error{ErrorKind::bad_input, "has no copy in " + backups.string(), from.string(),
+                 "`emberlock sessions backup` makes one"};
+  EMBERLOCK_RETURN_IF_ERROR(compare_copy(from, copy, Compare::bytes, observer));
+  const fs::path removed = from.parent_path() / (std::string(kRemovedPrefix) + from.filename().string());
+  fs::rename(from, removed, ec);
+  if (ec) return Error{ErrorKind::io, "cannot be removed: " + ec.message(), from.string()};
+  EMBERLOCK_RETURN_IF_ERROR(sync_folder(from.parent_path()));
+  fs::remove_all(removed, ec);
+  return {};
+}
+
+void finish_removals(const fs::path& sessions) {
+  std::error_code ec;
+  std::vector<fs::path> left;
+  for (fs::directory_iterator at(sessions, ec), end; !ec && at != end; at.increment(ec))
+    if (at->path().filename().string().starts_with(kRemovedPrefix)) left.push_back(at->path());
+  for (const fs::path& folder : left) fs::remove_all(folder, ec);
+}
+
+}  // namespace emberlock::session

@@ -25,10 +25,13 @@ Error unreadable(const std::filesystem::path& path, const char* what) {
 void Sha256::Free::operator()(void* context) const { EVP_MD_CTX_free(as_digest(context)); }
 
 Sha256::Sha256() : context_(EVP_MD_CTX_new()) {
-  if (!context_ || EVP_DigestInit_ex(as_digest(context_.get()), EVP_sha256(), nullptr) != 1) throw std::bad_alloc();
+  if (!context_ || EVP_DigestInit_ex(as_digest(context_.get()), EVP_sha256(), nullptr) != 1)
+    throw std::bad_alloc();
 }
 
-void Sha256::add(std::string_view bytes) { EVP_DigestUpdate(as_digest(context_.get()), bytes.data(), bytes.size()); }
+void Sha256::add(std::string_view bytes) {
+  EVP_DigestUpdate(as_digest(context_.get()), bytes.data(), bytes.size());
+}
 
 std::string Sha256::hex() {
   std::string digest(kSha256Digits / 2, '\0');

@@ -30,17 +30,18 @@ const unsigned char* bytes_of(std::string_view text) {
 /// A key that has a password isn't asked for it: that would wait for a terminal.
 int no_password(char* /*buffer*/, int /*size*/, int /*writing*/, void* /*user*/) { return -1; }
 
-Result<std::shared_ptr<EVP_PKEY>> read_pem(const std::filesystem::path& path, decltype(&PEM_read_bio_PUBKEY) read,
-                                           const char* what) {
+Result<std::shared_ptr<EVP_PKEY>> read_pem(const std::filesystem::path& path,
+                                           decltype(&PEM_read_bio_PUBKEY) read, const char* what) {
   EMBERLOCK_ASSIGN_OR_RETURN(const std::string text, read_file(path, kLongestPem));
   const std::unique_ptr<BIO, FreeEvp> bio(BIO_new_mem_buf(text.data(), static_cast<int>(text.size())));
   if (!bio) throw std::bad_alloc();
   std::shared_ptr<EVP_PKEY> key(read(bio.get(), nullptr, no_password, nullptr), FreeEvp());
   ERR_clear_error();
   if (key && EVP_PKEY_get_base_id(key.get()) == EVP_PKEY_ED25519) return key;
-  return Error{ErrorKind::bad_input, std::string("is not ") + what, path.string(),
-               "Make one, without a password: openssl genpkey -algorithm ed25519 -out key.pem; openssl pkey -in "
-               "key.pem -pubout -out public.pem"};
+  return Error{
+      ErrorKind::bad_input, std::string("is not ") + what, path.string(),
+      "Make one, without a password: openssl genpkey -algorithm ed25519 -out key.pem; openssl pkey -in "
+      "key.pem -pubout -out public.pem"};
 }
 
 std::string public_digits(const EVP_PKEY* key) {
@@ -85,8 +86,7 @@ bool is_signed_by(std::string_view public_key, std::string_view text, std::strin
   const Key key(EVP_PKEY_new_raw_public_key(EVP_PKEY_ED25519, nullptr, bytes_of(raw), raw.size()));
   const Signing context(EVP_MD_CTX_new());
   const bool good =
-      key && context &&
-      EVP_DigestVerifyInit(context.get(), nullptr, nullptr, nullptr, key.get()) == 1 &&
+      key && context && EVP_DigestVerifyInit(context.get(), nullptr, nullptr, nullptr, key.get()) == 1 &&
       EVP_DigestVerify(context.get(), bytes_of(bits), bits.size(), bytes_of(text), text.size()) == 1;
   ERR_clear_error();
   return good;

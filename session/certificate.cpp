@@ -31,7 +31,8 @@ Status check_version(std::string_view text, const std::string& where) {
   const auto json = nlohmann::json::parse(text, nullptr, false);
   const auto version = json.is_object() ? json.find("format_version") : json.end();
   if (!json.is_object() || version == json.end() || !version->is_number_unsigned())
-    return Error{ErrorKind::bad_input, "not a certificate: JSON with a format_version", where, kCertifyRemedy};
+    return Error{ErrorKind::bad_input, "not a certificate: JSON with a format_version", where,
+                 kCertifyRemedy};
   if (*version == kCertificateVersion) return {};
   return Error{ErrorKind::bad_input,
                "a certificate of version " + version->dump() + ", this program reads version " +
@@ -216,14 +217,12 @@ Result<std::optional<CertifiedSession>> check_certificate(const fs::path& folder
   CertifiedSession session;
   EMBERLOCK_ASSIGN_OR_RETURN(session.seal, check_seal(path, place, kSealsSession));
   EMBERLOCK_ASSIGN_OR_RETURN(session.certificate, parse_session_certificate(text, path.string()));
-  EMBERLOCK_ASSIGN_OR_RETURN(session.problems,
-                             changed_files(folder, session.certificate.files(), observer));
+  EMBERLOCK_ASSIGN_OR_RETURN(session.problems, changed_files(folder, session.certificate.files(), observer));
   EMBERLOCK_ASSIGN_OR_RETURN(const std::vector<std::string> names, files_below(folder));
   std::set<std::string> certified;
   for (const v1::HashedFile& file : session.certificate.files()) certified.insert(file.file());
   for (const std::string& name : names)
-    if (certified.count(name) == 0)
-      session.problems.push_back(name + ": was added after it was certified");
+    if (certified.count(name) == 0) session.problems.push_back(name + ": was added after it was certified");
   return std::optional(std::move(session));
 }
 

@@ -30,8 +30,9 @@ Result<v1::VolumeCertificate> parse_volume_certificate(std::string_view text, co
 /// Writes certificate.json, and replaces an earlier one: hashes every file of the folder, read once. What
 /// changes the session later (repair, compression) makes it void. `program` writes it, `key` may be null:
 /// unsigned. Errors: bad_input (no session), refused (not finished; a link among its files; cancelled), io.
-Result<v1::SessionCertificate> certify_session(const std::filesystem::path& folder, const std::string& program,
-                                               const SigningKey* key, const Observer& observer = {});
+Result<v1::SessionCertificate> certify_session(const std::filesystem::path& folder,
+                                               const std::string& program, const SigningKey* key,
+                                               const Observer& observer = {});
 
 struct CertifiedSession {
   v1::SessionCertificate certificate;

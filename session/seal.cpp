@@ -88,10 +88,10 @@ std::string blank_seal(const SigningKey* key) {
 Result<Seal> parse_seal(std::string_view text, const std::string& where) {
   if (text.starts_with(kSealForm) && !text.starts_with(kSealVersion))
     return no_seal("has a seal of another version than 1: a newer Emberlock reads it", where);
-  const bool formed = text.size() == kSealLength && text.starts_with(kSealVersion) &&
-                      text.substr(kKeyPlace - kBeforeKey.size(), kBeforeKey.size()) == kBeforeKey &&
-                      text.substr(kSignaturePlace - kBeforeSignature.size(), kBeforeSignature.size()) ==
-                          kBeforeSignature;
+  const bool formed =
+      text.size() == kSealLength && text.starts_with(kSealVersion) &&
+      text.substr(kKeyPlace - kBeforeKey.size(), kBeforeKey.size()) == kBeforeKey &&
+      text.substr(kSignaturePlace - kBeforeSignature.size(), kBeforeSignature.size()) == kBeforeSignature;
   if (!formed) return no_seal("has no seal where its certificate ends", where);
   Seal seal{std::string(text.substr(kHashPlace, kSha256Digits)),
             std::string(text.substr(kKeyPlace, kPublicKeyDigits)),
@@ -145,8 +145,8 @@ Result<Seal> check_seal(const fs::path& path, std::uint64_t offset, std::string_
   EMBERLOCK_ASSIGN_OR_RETURN(const std::string hash, hash_around(path, offset, observer));
   const char* const remedy = "Take the file as it was certified, from a copy";
   if (hash != seal.sha256)
-    return Error{ErrorKind::refused, "isn't what its certificate seals: its bytes were changed", path.string(),
-                 remedy};
+    return Error{ErrorKind::refused, "isn't what its certificate seals: its bytes were changed",
+                 path.string(), remedy};
   if (!seal.key.empty() && !is_signed_by(seal.key, signed_text(purpose, hash), seal.signature))
     return Error{ErrorKind::refused, "has a signature that isn't by the key that it names", path.string(),
                  remedy};

@@ -49,8 +49,7 @@ TEST(Sha256, DoesNotDependOnHowTheBytesComeAndAFilesIsThatOfItsBytes) {
 // RFC 8032, 7.1, TEST 2.
 TEST(Signature, IsWhatTheStandardSaysOfItsExample) {
   const test::TempFolder folder;
-  const std::string seed =
-      from_hex("4ccd089b28ff96da9db6c346ec114e0f5b8a319f35aba624da8cf6ed4fb8a6fb");
+  const std::string seed = from_hex("4ccd089b28ff96da9db6c346ec114e0f5b8a319f35aba624da8cf6ed4fb8a6fb");
   std::array<unsigned char, 32> bytes{};
   std::copy(seed.begin(), seed.end(), bytes.begin());
   const test::KeyFiles files(folder.path(), bytes);

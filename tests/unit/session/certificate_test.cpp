@@ -81,7 +81,8 @@ TEST_F(SessionCertificateTest, EqualSessionsHaveEqualOnes) {
 TEST_F(SessionCertificateTest, OneChangedByteInAnyFileIsFound) {
   for (const SigningKey* key : {static_cast<const SigningKey*>(nullptr), &std::as_const(key_)}) {
     certify(key);
-    const std::vector<fs::path> all = files();
+    std::vector<fs::path> all = files();
+    std::erase_if(all, [](const fs::path& path) { return fs::file_size(path) == 0; });
     ASSERT_THAT(problems(), ElementsAre());
     RandomStream random(7, 1);
     int found = 0;
@@ -107,7 +108,9 @@ TEST_F(SessionCertificateTest, FilesThatAreAddedMissingOrCutAreNamed) {
   const fs::path index = index_path(session_, "cam0");
   const std::string bytes = bytes_of(index);
   put_bytes(index, std::string_view(bytes).substr(0, bytes.size() - 1));
-  EXPECT_THAT(problems(), ElementsAre(HasSubstr("cam0/index.bin: has 339 bytes, and had 340")));
+  EXPECT_THAT(problems(),
+              ElementsAre("cam0/index.bin: has " + std::to_string(bytes.size() - 1) + " bytes, and had " +
+                          std::to_string(bytes.size()) + " when it was certified"));
   fs::remove(index);
   EXPECT_THAT(problems(), ElementsAre(HasSubstr("cam0/index.bin: is missing")));
   put_bytes(index, bytes);
@@ -146,7 +149,8 @@ TEST_F(SessionCertificateTest, WhatIsCutTwiceOrOfAnotherVersionIsAClearError) {
   const std::string text = bytes_of(path);
   const auto seal_anew = [&](std::string changed) {  // as a forger, or another version, would
     const std::size_t place = place_of_seal(changed, "").value();
-    put_bytes(path, sealed(changed.replace(place, kSealLength, blank_seal(nullptr)), place, nullptr, kSealsSession));
+    put_bytes(path, sealed(changed.replace(place, kSealLength, blank_seal(nullptr)), place, nullptr,
+                           kSealsSession));
   };
   for (const std::size_t cut : {std::size_t{0}, std::size_t{1}, text.size() / 2, text.size() - 1}) {
     put_bytes(path, text.substr(0, cut));

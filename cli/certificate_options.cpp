@@ -65,9 +65,10 @@ std::string words_of(const recon::Certification& certification, Seconds time) {
 }  // namespace
 
 CLI::Option* add_key_option(CLI::App* verb, std::string& key) {
-  return verb->add_option("--key", key,
-                          "Sign the certificate with this private Ed25519 key (PEM), as `openssl genpkey -algorithm "
-                          "ed25519 -out FILE` makes it [unsigned]");
+  return verb->add_option(
+      "--key", key,
+      "Sign the certificate with this private Ed25519 key (PEM), as `openssl genpkey -algorithm "
+      "ed25519 -out FILE` makes it [unsigned]");
 }
 
 void add_certificate_options(CLI::App* verb, CertificateArguments& a) {

@@ -51,8 +51,8 @@ std::string words_of(const v1::CameraCalibration& c) {
   if (c.centre_m_size() == 3)
     words += fmt::format(", at {:.4f} {:.4f} {:.4f} m", c.centre_m(0), c.centre_m(1), c.centre_m(2));
   if (c.centre_sigma_m_size() == 3)
-    words += fmt::format(" +- {:.2f} mm", 1e3 * std::hypot(c.centre_sigma_m(0), c.centre_sigma_m(1),
-                                                          c.centre_sigma_m(2)));
+    words += fmt::format(" +- {:.2f} mm",
+                         1e3 * std::hypot(c.centre_sigma_m(0), c.centre_sigma_m(1), c.centre_sigma_m(2)));
   return words + ", calibration " + c.sha256().substr(0, 16);
 }
 
@@ -66,7 +66,8 @@ void print_sync(const v1::SyncEvidence& sync) {
 }
 
 void print_session(const v1::FilmedSession& session) {
-  line("session", fmt::format("{} of {}, by {}", session.session_id(), session.created_utc(), session.software()));
+  line("session",
+       fmt::format("{} of {}, by {}", session.session_id(), session.created_utc(), session.software()));
   line("filmed", fmt::format("frame {}, {}", session.frame(), utc(session.filmed_utc_ns())));
   print_sync(session.sync());
   for (const auto& camera : session.cameras()) {
@@ -83,8 +84,9 @@ void print_session(const v1::FilmedSession& session) {
 void print_reconstruction(const v1::Reconstruction& made) {
   if (made.voxels_size() != 3) return;
   line("reconstruction",
-       fmt::format("{} x {} x {} voxels of {:.2f} mm, solver {}, {} iterations, {}", made.voxels(0), made.voxels(1),
-                   made.voxels(2), 1e3 * made.voxel_edge_m(), made.solver(), made.iterations(), made.device()));
+       fmt::format("{} x {} x {} voxels of {:.2f} mm, solver {}, {} iterations, {}", made.voxels(0),
+                   made.voxels(1), made.voxels(2), 1e3 * made.voxel_edge_m(), made.solver(),
+                   made.iterations(), made.device()));
   std::vector<std::string> options;
   for (const auto& option : made.options())
     options.push_back(fmt::format("--{} {}", option.name(), option.value()));
@@ -97,7 +99,8 @@ void print_certificate(const v1::VolumeCertificate& certificate) {
       print_session(certificate.session());
       break;
     case v1::VolumeCertificate::PICTURES:
-      line("made of", "pictures, without a session: nothing tells when they were taken, nor how well in sync");
+      line("made of",
+           "pictures, without a session: nothing tells when they were taken, nor how well in sync");
       break;
     case v1::VolumeCertificate::SIMULATION:
       line("made of", "nothing filmed: it was computed");
@@ -110,7 +113,8 @@ void print_certificate(const v1::VolumeCertificate& certificate) {
       line("made of", "what nobody told");
   }
   const int files = certificate.session().files_size() + certificate.made_from_size();
-  line("files", certificate.hashes_left_out() ? "their hashes were left out, as asked" : fmt::format("{} hashed", files));
+  line("files", certificate.hashes_left_out() ? "their hashes were left out, as asked"
+                                              : fmt::format("{} hashed", files));
   print_reconstruction(certificate.reconstruction());
   if (!certificate.program().empty()) line("by", certificate.program());
   if (!certificate.has_exported()) return;
@@ -119,7 +123,8 @@ void print_certificate(const v1::VolumeCertificate& certificate) {
 }
 
 Error session_error(const std::string& what, const std::string& folder) {
-  return {ErrorKind::bad_input, what, folder, "Leave --session away, or name the session that it was made of"};
+  return {ErrorKind::bad_input, what, folder,
+          "Leave --session away, or name the session that it was made of"};
 }
 
 /// Of the innermost volume, which the others were exported from.
@@ -168,9 +173,9 @@ Status verify_volume(const VerifyVolumeArguments& a) {
     EMBERLOCK_ASSIGN_OR_RETURN(files, check_session(a, volume.certificate));
   }
   if (a.json) {
-    EMBERLOCK_ASSIGN_OR_RETURN(const std::string text,
-                               session::json_of(volume.certificate, session::Defaults::left_out,
-                                                "the certificate", a.volume));
+    EMBERLOCK_ASSIGN_OR_RETURN(
+        const std::string text,
+        session::json_of(volume.certificate, session::Defaults::left_out, "the certificate", a.volume));
     nlohmann::ordered_json json{{"holds", true},
                                 {"bytes", volume.bytes},
                                 {"sha256", volume.seal.sha256},
@@ -184,7 +189,7 @@ Status verify_volume(const VerifyVolumeArguments& a) {
   line("sha256", volume.seal.sha256);
   line("signed by", volume.seal.key.empty() ? "nobody"
                     : trusted               ? volume.seal.key + ", the key given"
-                                            : volume.seal.key + ", which nobody vouched for: see --public-key");
+                              : volume.seal.key + ", which nobody vouched for: see --public-key");
   if (!a.session.empty()) line("session's files", fmt::format("{} of {} are as they were", files, files));
   print_certificate(volume.certificate);
   return {};
@@ -194,9 +199,9 @@ Status verify_volume(const VerifyVolumeArguments& a) {
 
 void add_verify_volume(CLI::App& app) {
   auto arguments = std::make_shared<VerifyVolumeArguments>();
-  CLI::App* verb = app.add_subcommand(
-      "verify-volume",
-      "Says what a volume's certificate says, and whether it holds. Exit code 1: it doesn't; 2: there is none");
+  CLI::App* verb = app.add_subcommand("verify-volume",
+                                      "Says what a volume's certificate says, and whether it holds. Exit "
+                                      "code 1: it doesn't; 2: there is none");
   verb->add_option("VOLUME", arguments->volume, "A volume.vdb, or a flame.vdb of `export`")->required();
   verb->add_option("--session", arguments->session,
                    "The session's folder: also compares its files with those that the volume was made of");

@@ -21,7 +21,8 @@ Result<std::optional<CertificateText>> certificate_in(const fs::path& vdb) {
   std::ifstream file(vdb, std::ios::binary);
   if (!file)
     return Error{ErrorKind::io, "can't be read", vdb.string(), "Check that the file is there and readable"};
-  EMBERLOCK_ASSIGN_OR_RETURN(std::optional<VdbText> found, find_vdb_text(file, kCertificateKey, vdb.string()));
+  EMBERLOCK_ASSIGN_OR_RETURN(std::optional<VdbText> found,
+                             find_vdb_text(file, kCertificateKey, vdb.string()));
   if (!found) return std::optional<CertificateText>();
   EMBERLOCK_ASSIGN_OR_RETURN(const std::size_t place, session::place_of_seal(found->text, vdb.string()));
   return std::optional(CertificateText{std::move(found->text), found->offset + place});
@@ -45,8 +46,8 @@ Result<std::optional<CertifiedVolume>> check_volume(const fs::path& vdb, const O
   EMBERLOCK_ASSIGN_OR_RETURN(const std::optional<CertificateText> found, certificate_in(vdb));
   if (!found) return std::optional<CertifiedVolume>();
   CertifiedVolume volume;
-  EMBERLOCK_ASSIGN_OR_RETURN(
-      volume.seal, session::check_seal(vdb, found->seal_offset, session::kSealsVolume, observer));
+  EMBERLOCK_ASSIGN_OR_RETURN(volume.seal,
+                             session::check_seal(vdb, found->seal_offset, session::kSealsVolume, observer));
   EMBERLOCK_ASSIGN_OR_RETURN(volume.certificate,
                              session::parse_volume_certificate(found->text, vdb.string()));
   std::error_code ec;

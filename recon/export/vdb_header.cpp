@@ -11,7 +11,7 @@
 namespace emberlock::recon {
 namespace {
 
-constexpr std::uint64_t kMagic = 0x56444220;  // " BDV", as 64 bits
+constexpr std::uint64_t kMagic = 0x56444220;                   // " BDV", as 64 bits
 constexpr std::uint64_t kFirstMetadatum = 8 + 3 * 4 + 1 + 36;  // behind magic, versions, offsets, identifier
 constexpr std::uint32_t kLongestName = 1024;
 constexpr std::uint32_t kLongestText = std::uint32_t{64} << 20;
@@ -69,12 +69,14 @@ class HeaderReader {
 };
 
 Error bad_header(std::string what, const std::string& where) {
-  return {ErrorKind::bad_input, std::move(what), where, "Name a volume.vdb that `emberlock reconstruct` wrote"};
+  return {ErrorKind::bad_input, std::move(what), where,
+          "Name a volume.vdb that `emberlock reconstruct` wrote"};
 }
 
 }  // namespace
 
-Result<std::optional<VdbText>> find_vdb_text(std::istream& file, std::string_view key, const std::string& where) {
+Result<std::optional<VdbText>> find_vdb_text(std::istream& file, std::string_view key,
+                                             const std::string& where) {
   HeaderReader header(file);
   if (header.number<std::uint64_t>() != kMagic) return bad_header("isn't an OpenVDB file", where);
   header.go_to(kFirstMetadatum);

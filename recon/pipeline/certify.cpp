@@ -123,7 +123,8 @@ v1::SyncEvidence sync_of(const session::SessionReader& reader,
 }
 
 /// Of a camera that is placed.
-void tell_calibration(const v1::Calibration& calibration, const CameraModel& camera, v1::CameraCalibration& told) {
+void tell_calibration(const v1::Calibration& calibration, const CameraModel& camera,
+                      v1::CameraCalibration& told) {
   told.set_sha256(sha256(calibration.SerializeAsString()));
   told.set_fx(calibration.fx());
   told.set_fy(calibration.fy());
@@ -144,7 +145,8 @@ void tell_camera(const v1::CameraStream& stream, const std::optional<FilmedFrame
   camera.set_height(stream.height());
   camera.set_frame_rate_hz(stream.frame_rate_hz());
   camera.set_recorded(counts.recorded());
-  camera.set_lost(counts.camera_gap() + counts.transport() + counts.underrun() + counts.queue() + counts.disk());
+  camera.set_lost(counts.camera_gap() + counts.transport() + counts.underrun() + counts.queue() +
+                  counts.disk());
   if (filmed) camera.set_frame(filmed->frame);
   const ImageSize size{static_cast<int>(stream.width()), static_cast<int>(stream.height())};
   if (const auto model = camera_model_of(stream.calibration(), size, stream.camera_id(), ""))

@@ -34,14 +34,15 @@ class FileHashes {
 };
 
 /// Says where load_scene()'s scene comes from. Of a session: who filmed what when, how well the cameras were
-/// in sync, how they are calibrated, and the hashes of its manifest, events, times, indices and those segments
-/// that hold the frames shown. Of other inputs: the hashes of files_of(). `further`: files beside these, such
-/// as a response. `hashes` null: none. Errors: those of reading; refused (the observer ends it).
+/// in sync, how they are calibrated, and the hashes of its manifest, events, times, indices and those
+/// segments that hold the frames shown. Of other inputs: the hashes of files_of(). `further`: files beside
+/// these, such as a response. `hashes` null: none. Errors: those of reading; refused (the observer ends it).
 Result<v1::VolumeCertificate> origin_of(const std::filesystem::path& input, const SceneOptions& options,
                                         const std::vector<std::filesystem::path>& further, FileHashes* hashes,
                                         const Observer& observer = {});
 
-/// Of the volume `vdb`, which is exported: its hash and what its own certificate says. Error: it doesn't hold.
+/// Of the volume `vdb`, which is exported: its hash and what its own certificate says. Error: it doesn't
+/// hold.
 Result<v1::VolumeCertificate> origin_of_export(const std::filesystem::path& vdb);
 
 /// Adds what the reconstruction did.

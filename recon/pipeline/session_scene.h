@@ -7,7 +7,6 @@
 #include <vector>
 
 #include "base/quantity.h"
-#include "emberlock/v1/session.pb.h"
 #include "recon/pipeline/scene.h"
 #include "session/reader.h"
 

@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
+#include "recon/export/certificate.h"
+
 #include <cstddef>
 #include <cstdint>
 #include <cstdlib>
@@ -6,7 +8,6 @@
 #include <string>
 #include <string_view>
 
-#include "recon/export/certificate.h"
 #include "recon/export/vdb_header.h"
 
 namespace {
@@ -34,7 +35,8 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   if (found && *found && (*found)->offset + (*found)->text.size() > size) std::abort();
   const std::string& text = found && *found ? (*found)->text : bytes;
   if (const auto place = session::place_of_seal(text, "input"); place) {
-    const auto seal = session::parse_seal(std::string_view(text).substr(*place, session::kSealLength), "input");
+    const auto seal =
+        session::parse_seal(std::string_view(text).substr(*place, session::kSealLength), "input");
     if (seal && seal->sha256.size() != 64) std::abort();
   }
   if (const auto volume = session::parse_volume_certificate(text, "input"); volume)

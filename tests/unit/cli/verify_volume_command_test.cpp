@@ -93,7 +93,8 @@ TEST_F(VerifyVolumeTest, WhatDoesNotHoldExitsWithOneAndWhatIsNotThereWithTwo) {
   const auto none = verify(volume);
   EXPECT_EQ(none.exit_code, 2);
   EXPECT_THAT(none.err, HasSubstr("carries no certificate"));
-  EXPECT_THAT(verify(write({}), {"--session", session_.string()}).err, HasSubstr("the volume isn't of a session"));
+  EXPECT_THAT(verify(write({}), {"--session", session_.string()}).err,
+              HasSubstr("the volume isn't of a session"));
   EXPECT_THAT(verify(volume_of_session(nullptr), {"--session", session_.string()}).err,
               HasSubstr("they were left out"));
   EXPECT_EQ(verify(folder_ / "no.vdb").exit_code, 1);
@@ -117,10 +118,10 @@ TEST_F(VerifyVolumeTest, TheTrustedKeyMustHaveSigned) {
 TEST_F(VerifyVolumeTest, JsonIsForPrograms) {
   const auto run = verify(volume_of_session(&hashes_), {"--json"});
   ASSERT_EQ(run.exit_code, 0) << run.err;
-  const auto json = nlohmann::json::parse(run.out);
-  EXPECT_TRUE(json["holds"].get<bool>());
-  EXPECT_EQ(json["certificate"]["origin"], "SESSION");
-  EXPECT_EQ(json["certificate"]["session"]["files"].size(), 4U);
+  const auto told = nlohmann::json::parse(run.out);
+  EXPECT_TRUE(told["holds"].get<bool>());
+  EXPECT_EQ(told["certificate"]["origin"], "SESSION");
+  EXPECT_EQ(told["certificate"]["session"]["files"].size(), 4U);
 }
 
 TEST_F(VerifyVolumeTest, WhatForeignHandsWroteMovesNoCursor) {
@@ -168,8 +169,7 @@ TEST_F(VerifyVolumeTest, SessionsAreCertifiedAndVerified) {
   const auto sessions = [&](Words words) { return test::run_verb(add_sessions, std::move(words)); };
   const Words verified{"sessions", "verify", session_.string(), "--public-key", key_.public_pem.string()};
   EXPECT_THAT(sessions(verified).err, HasSubstr("has no certificate"));
-  const auto done =
-      sessions({"sessions", "certify", session_.string(), "--key", key_.private_pem.string()});
+  const auto done = sessions({"sessions", "certify", session_.string(), "--key", key_.private_pem.string()});
   EXPECT_EQ(done.exit_code, 0) << done.err;
   EXPECT_THAT(done.out, HasSubstr("files            4, "));
   EXPECT_THAT(sessions(verified).out, HasSubstr("4 files as certified, signed by "));
@@ -178,8 +178,9 @@ TEST_F(VerifyVolumeTest, SessionsAreCertifiedAndVerified) {
   EXPECT_THAT(sessions(verified).out, HasSubstr("extra: was added after it was certified"));
   EXPECT_EQ(sessions(verified).exit_code, 1);
   fs::remove(session_ / "extra");
-  EXPECT_EQ(sessions({"sessions", "certify", session_.string(), "--key", other_.private_pem.string()}).exit_code,
-            0);
+  EXPECT_EQ(
+      sessions({"sessions", "certify", session_.string(), "--key", other_.private_pem.string()}).exit_code,
+      0);
   EXPECT_THAT(sessions(verified).err, HasSubstr("is signed by another key"));
 }
 

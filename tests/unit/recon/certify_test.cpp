@@ -11,6 +11,7 @@
 #include <gtest/gtest.h>
 
 #include "recon/synthetic/flame.h"
+#include "session/events.h"
 #include "session/shutter_times.h"
 #include "tests/support/recording.h"
 #include "tests/support/scene_files.h"
@@ -34,7 +35,8 @@ class CertifySessionTest : public testing::Test {
       c.set_fy(21);
       c.set_cx(8);
       c.set_cy(4);
-      for (const double v : {1., 0., 0., -0.5 * i, 0., 1., 0., 0., 0., 0., 1., 2.}) c.add_camera_from_world(v);
+      for (const double v : {1., 0., 0., -0.5 * i, 0., 1., 0., 0., 0., 0., 1., 2.})
+        c.add_camera_from_world(v);
       for (int s = 0; s < 15; ++s) c.add_sigma(1e-3 * s);
     }
     session::WriterOptions options = test::small_disk_options();
@@ -84,7 +86,7 @@ TEST_F(CertifySessionTest, TellsWhoFilmedWhatWhen) {
   EXPECT_EQ(camera.recorded(), 6U);
   EXPECT_EQ(camera.calibration().fx(), 21);
   EXPECT_THAT(camera.calibration().centre_m(), ElementsAre(0.5, 0, -2));
-  EXPECT_THAT(camera.calibration().centre_sigma_m(), ElementsAre(9e-3, 10e-3, 11e-3));
+  EXPECT_THAT(camera.calibration().centre_sigma_m(), ElementsAre(1e-3 * 9, 1e-3 * 10, 1e-3 * 11));
   EXPECT_NE(camera.calibration().sha256(), session.cameras(2).calibration().sha256());
   EXPECT_TRUE(session.sync().source().empty()) << "nothing tells";
 }
@@ -92,7 +94,8 @@ TEST_F(CertifySessionTest, TellsWhoFilmedWhatWhen) {
 TEST_F(CertifySessionTest, HashesTheFilesThatTheFrameIsMadeOf) {
   record();
   std::vector<std::string> names;
-  for (const auto& file : told(&hashes_, 2).session().files()) {
+  const v1::VolumeCertificate certificate = told(&hashes_, 2);
+  for (const auto& file : certificate.session().files()) {
     names.push_back(file.file());
     EXPECT_EQ(file.sha256(), sha256(test::bytes_of(session_ / file.file())));
     EXPECT_EQ(file.bytes(), fs::file_size(session_ / file.file()));
@@ -102,8 +105,10 @@ TEST_F(CertifySessionTest, HashesTheFilesThatTheFrameIsMadeOf) {
   const v1::VolumeCertificate without = told(nullptr);
   EXPECT_EQ(without.session().files_size(), 0);
   EXPECT_TRUE(without.hashes_left_out());
-  test::put_bytes(session_ / "events.binpb", "");  // a file that changes is hashed anew
-  EXPECT_EQ(told(&hashes_).session().files(6).sha256(), sha256(""));
+  v1::Event event;
+  event.set_note("a file that changes is hashed anew");
+  test::put_bytes(session_ / "events.binpb", session::encode(event));
+  EXPECT_EQ(told(&hashes_).session().files(6).sha256(), sha256(session::encode(event)));
 }
 
 TEST_F(CertifySessionTest, TellsHowWellTheCamerasWereInSyncByItsTimes) {

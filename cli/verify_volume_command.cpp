@@ -66,8 +66,11 @@ void print_sync(const v1::SyncEvidence& sync) {
 }
 
 void print_session(const v1::FilmedSession& session) {
-  line("session",
-       fmt::format("{} of {}, by {}", session.session_id(), session.created_utc(), session.software()));
+  const auto if_told = [](const char* before, const std::string& words) {
+    return words.empty() ? "" : before + words;
+  };
+  line("session", session.session_id() + if_told(", begun ", session.created_utc()) +
+                      if_told(", recorded by ", session.software()));
   line("filmed", fmt::format("frame {}, {}", session.frame(), utc(session.filmed_utc_ns())));
   print_sync(session.sync());
   for (const auto& camera : session.cameras()) {
@@ -106,8 +109,9 @@ void print_certificate(const v1::VolumeCertificate& certificate) {
       line("made of", "nothing filmed: it was computed");
       break;
     case v1::VolumeCertificate::VOLUME:
-      line("made of", fmt::format("another volume, {}",
-                                  certificate.made_from_size() > 0 ? certificate.made_from(0).sha256() : ""));
+      line("made of", fmt::format("another volume, {}{}",
+                                  certificate.made_from_size() > 0 ? certificate.made_from(0).sha256() : "",
+                                  certificate.has_exported() ? "" : ", which carried no certificate"));
       break;
     default:
       line("made of", "what nobody told");

@@ -55,6 +55,7 @@ void add_batch_options(CLI::App* verb, BatchArguments& b) {
     verb->remove_option(verb->get_option(name));
   add_picture_options(verb, a);
   add_quantity_options(verb, a);
+  add_certificate_options(verb, a.certificate);
   verb->add_option("--seed", a.seed, "Seed of the random numbers in the paper's solver")
       ->check(CLI::NonNegativeNumber)
       ->capture_default_str();
@@ -73,7 +74,7 @@ std::string absolute(const std::string& path) {
 
 /// As it is meant in every folder.
 std::string value_of(const CLI::Option& option) {
-  static const std::set<std::string> kPaths{"--out", "--rig", "--response"};
+  static const std::set<std::string> kPaths{"--out", "--rig", "--response", "--key"};
   const std::string value = fmt::format("{}", fmt::join(option.results(), ","));
   return kPaths.contains(option.get_name()) ? absolute(value) : value;
 }
@@ -190,7 +191,8 @@ void add_batch(CLI::App& app) {
   add_submit(*verb);
   add_batch_status(*verb);
   verb->require_subcommand(0, 1);
-  verb->callback([arguments, verb] {
+  verb->callback([arguments, verb, &app] {
+    arguments->reconstruct.certificate.program = app.version();
     if (!verb->get_subcommands().empty()) return;
     check_given(*arguments);
     arguments->options = given_to(*verb);

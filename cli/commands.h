@@ -17,6 +17,8 @@ void add_reconstruct(CLI::App& app);
 /// `batch`, `batch submit` and `batch status`.
 void add_batch(CLI::App& app);
 void add_verify(CLI::App& app);
+/// `verify-volume`.
+void add_verify_volume(CLI::App& app);
 void add_view(CLI::App& app);
 void add_measure(CLI::App& app);
 void add_render(CLI::App& app);

@@ -8,12 +8,14 @@
 #include <new>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include "cli/certificate_options.h"
 #include "cli/commands.h"
 #include "cli/interrupt.h"
 #include "cli/numbers.h"
@@ -22,6 +24,7 @@
 #include "recon/export/nanovdb_file.h"
 #include "recon/export/volume_file.h"
 #include "recon/export/vti_file.h"
+#include "recon/pipeline/certify.h"
 
 namespace emberlock::cli {
 namespace {
@@ -32,6 +35,7 @@ struct ExportArguments {
   std::string format = "vdb";
   std::optional<std::pair<std::size_t, std::size_t>> frames;  ///< the first and the last
   std::vector<std::string> grids;                             ///< all if empty
+  std::string key;                                            ///< a PEM file; empty: unsigned
 };
 
 struct FileFormat {
@@ -93,10 +97,14 @@ Error lacks_grid(const std::string& name, const recon::SharedVolume& volume, con
 /// A volume with `flame` in shares of `white`, and of its grids those that are asked for.
 Result<recon::SharedVolume> shared_volume(const ExportArguments& a, const ResultVolume& from, float white,
                                           const std::string& program) {
+  EMBERLOCK_ASSIGN_OR_RETURN(v1::VolumeCertificate origin, recon::origin_of_export(from.file));
+  origin.set_program(program);
   EMBERLOCK_ASSIGN_OR_RETURN(recon::SharedVolume volume, recon::read_shared_volume(from.file));
   EMBERLOCK_ASSIGN_OR_RETURN(const recon::Lighting lighting, recon::read_lighting(from.file));
   volume.provenance = {program, reported(from.file, "input"), reported(from.file, "up"), from.frame,
                        lighting};
+  EMBERLOCK_ASSIGN_OR_RETURN(auto key, key_of(a.key));
+  volume.certification = {std::move(origin), std::move(key)};
   if (white > 0) recon::add_flame(volume, white);
   if (a.format == "vti") recon::add_told(volume);
   for (const std::string& name : a.grids)
@@ -153,6 +161,11 @@ void print(const ExportArguments& a, const std::vector<ResultVolume>& volumes,
   if (last.find(recon::kFlame) != nullptr)
     std::printf("%-16s 1 stands for a luminance of %.6g grey levels per metre\n", "flame",
                 static_cast<double>(white));
+  const bool vdb = std::string_view(file_formats().at(a.format).ending) == ".vdb";
+  std::printf("%-16s %s\n", "certificate",
+              !vdb                     ? "none: files of this format carry none, only OpenVDB's do"
+              : last.certification.key ? ("signed by " + last.certification.key->public_key()).c_str()
+                                       : "unsigned");
   if (!last.provenance.up.empty()) std::printf("%-16s %s points up\n", "axes", last.provenance.up.c_str());
   std::printf("%-16s %s", "written to",
               (fs::path(a.out) / file_name(volumes.front(), file_formats().at(a.format).ending)).c_str());
@@ -167,6 +180,9 @@ Status export_result(const ExportArguments& a, const std::string& program) try {
   EMBERLOCK_RETURN_IF_ERROR(OutputFolder::check(request));
   warn_of_missing(a, all);
   const FileFormat& format = file_formats().at(a.format);
+  if (!a.key.empty() && std::string_view(format.ending) != ".vdb")
+    return Error{ErrorKind::bad_input, "files of this format carry no certificate to sign", "--key",
+                 "Leave it away, or choose --format vdb or blender4"};
   const Progress bar = progress_bar("export");
   const Interrupt interrupt;
   // Of all frames, so that parts of a sequence that are exported one by one have one scale.
@@ -217,6 +233,7 @@ void add_export(CLI::App& app) {
                    "Names between commas: emission, density, flame, temperature, ... [all that there are]")
       ->delimiter(',')
       ->type_name("TEXT");
+  add_key_option(verb, a.key);
   verb->callback([arguments, &app] {
     const std::string version = app.version();
     or_fail(export_result(*arguments, version.empty() ? "emberlock" : version));

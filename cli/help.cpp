@@ -35,8 +35,8 @@ const std::vector<VerbGroup>& verb_groups() {
       {"Cameras", {"devices", "smear", "calibrate"}},
       {"Films of other cameras", {"verify", "import"}},
       {"Volumes",
-       {"reconstruct", "batch", "view", "render", "scene", "ar", "marker", "stylize", "export", "measure",
-        "tradeoff", "evaluate"}}};
+       {"reconstruct", "batch", "view", "render", "scene", "ar", "marker", "stylize", "export",
+        "verify-volume", "measure", "tradeoff", "evaluate"}}};
   return groups;
 }
 

@@ -111,10 +111,9 @@ Result<recon::ReconstructOptions> options_of(const ReconstructArguments& argumen
   return options;
 }
 
-Result<recon::Scene> load_views(const ReconstructArguments& arguments, const Progress& progress) {
+Result<recon::SceneOptions> scene_options_of(const ReconstructArguments& arguments) {
   recon::SceneOptions options;
   options.frame = arguments.frame;
-  options.progress = progress;
   options.threads = arguments.threads;
   options.recording = arguments.recording;
   if (!arguments.box.empty()) {
@@ -124,6 +123,12 @@ Result<recon::Scene> load_views(const ReconstructArguments& arguments, const Pro
   EMBERLOCK_RETURN_IF_ERROR(recon::parse_background(arguments.background, options.frames));
   EMBERLOCK_RETURN_IF_ERROR(recon::parse_smear(arguments.smear, options.frames));
   if (arguments.demosaic == "gradient") options.frames.develop.demosaicing = recon::Demosaicing::gradient;
+  return options;
+}
+
+Result<recon::Scene> load_views(const ReconstructArguments& arguments, const Progress& progress) {
+  EMBERLOCK_ASSIGN_OR_RETURN(recon::SceneOptions options, scene_options_of(arguments));
+  options.progress = progress;
   EMBERLOCK_ASSIGN_OR_RETURN(recon::Scene scene, recon::load_scene(arguments.input, options));
   EMBERLOCK_RETURN_IF_ERROR(recon::hold_out(scene, arguments.held_out));
   if (arguments.shrink > 1) {

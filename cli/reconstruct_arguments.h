@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "base/progress.h"
+#include "cli/certificate_options.h"
 #include "cli/commands.h"
 #include "cli/reconstruct_daemon.h"
 #include "recon/pipeline/reconstruct.h"
@@ -56,10 +57,13 @@ struct ReconstructArguments {
   std::optional<int> progress_fd;
   DaemonReconstruction by_daemon;
   std::shared_ptr<recon::SharedRecording> recording = {};  ///< of a sequence's frames
+  CertificateArguments certificate;
 };
 
 /// Interprets the options; or the first error, as in parse_box.
 Result<recon::ReconstructOptions> options_of(const ReconstructArguments& arguments);
+/// What load_views() makes of the options.
+Result<recon::SceneOptions> scene_options_of(const ReconstructArguments& arguments);
 /// The requested views of the requested frame, with their roles.
 Result<recon::Scene> load_views(const ReconstructArguments& arguments, const Progress& progress);
 /// The files that are read; they must not lie in the output folder.

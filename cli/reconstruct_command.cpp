@@ -189,6 +189,7 @@ void add_reconstruct(CLI::App& app) {
   add_frame_options(verb, a);
   add_picture_options(verb, a);
   add_quantity_options(verb, a);
+  add_certificate_options(verb, a.certificate);
   verb->add_option("--seed", a.seed, "Seed of the random numbers in the paper's solver")
       ->check(CLI::NonNegativeNumber)
       ->capture_default_str();
@@ -209,7 +210,8 @@ void add_reconstruct(CLI::App& app) {
       ->excludes("--progress-fd");
   for (const char* range : {"--last-frame", "--frames"})
     verb->get_option(range)->excludes("--plan")->excludes("--progress-fd");
-  verb->callback([arguments, verb, by_daemon] {
+  verb->callback([arguments, verb, by_daemon, &app] {
+    arguments->certificate.program = app.version();
     for (const char* option : {"--every", "--cold", "--at-once"})
       if (verb->count(option) > 0 && !arguments->last_frame)
         throw CLI::RequiresError(option, "--frames or --last-frame");

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "base/clock.h"
+#include "cli/certificate_options.h"
 #include "recon/export/temperature_look_up.h"
 #include "recon/pipeline/coverage.h"
 #include "recon/pipeline/grid_choice.h"
@@ -35,6 +36,7 @@ Result<Written> reconstruct_files(const ReconstructArguments& arguments, const W
   const TimePoint begin = clock.now();
   EMBERLOCK_ASSIGN_OR_RETURN(const recon::Scene scene, load_views(arguments, watchers.progress));
   const Seconds loading = clock.now() - begin;
+  EMBERLOCK_ASSIGN_OR_RETURN(const Certified certified, certify(arguments, watchers.progress, watchers.stop));
   warn_if_too_fine(scene, options, stderr);
   if (recon::is_stopped(options.solve))
     return Error{ErrorKind::refused, "ended early, as asked, before there was a volume to keep",
@@ -53,11 +55,11 @@ Result<Written> reconstruct_files(const ReconstructArguments& arguments, const W
   outcome.report.input = arguments.input;
   outcome.report.up = report::shown_axes(scene.views).up_axis();
   const TimePoint done = clock.now();
-  EMBERLOCK_RETURN_IF_ERROR(
-      recon::write_outcome(outcome, arguments.out, inputs, report::reconstruct_html(scene, outcome)));
+  EMBERLOCK_RETURN_IF_ERROR(recon::write_outcome(
+      outcome, arguments.out, inputs, report::reconstruct_html(scene, outcome), certified.certification));
   const Seconds writing = clock.now() - done;
   if (watchers.stream != nullptr) watchers.stream->done(outcome, scene, arguments.out);
-  return Written{std::move(outcome), std::move(options.solve), loading, writing};
+  return Written{std::move(outcome), std::move(options.solve), loading, writing, certified.words};
 }
 
 }  // namespace emberlock::cli

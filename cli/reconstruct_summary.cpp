@@ -32,6 +32,7 @@ void print_summary(const Written& written, const std::string& out) {
               report.solve_time.value(), report.iterations, report.solver.c_str(), report.device.c_str());
   std::printf("%-16s %.2f s before that for loading, %.2f s after it for writing\n", "files",
               written.loading.value(), written.writing.value());
+  std::printf("%-16s %s\n", "certificate", written.certificate.c_str());
   for (const recon::EffectReport& effect : report.effects) {
     std::printf("%-16s %s: %s\n", effect.name.c_str(), effect.on ? "on" : "off", effect.reason.c_str());
   }

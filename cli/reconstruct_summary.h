@@ -15,6 +15,7 @@ struct Written {
   recon::Outcome outcome;
   recon::SolveOptions asked;
   Seconds loading{0}, writing{0};
+  std::string certificate;  ///< in words: by whom signed, what was hashed, how long that took
 };
 
 /// Where it came from and went, and how it is told.

@@ -7,11 +7,15 @@
 
 #include <fmt/format.h>
 
+#include "base/clock.h"
+#include "base/signature.h"
+#include "cli/certificate_options.h"
 #include "cli/commands.h"
 #include "cli/daemon_words.h"
 #include "cli/interrupt.h"
 #include "cli/sessions_backup.h"
 #include "cli/sessions_daemon.h"
+#include "session/certificate.h"
 #include "session/export.h"
 #include "session/job_json.h"
 #include "session/job_messages.h"
@@ -28,6 +32,8 @@ struct SessionsArguments {
   std::string folder;
   std::string out;
   std::string format = "png";
+  std::string key, public_key;  ///< PEM files
+  std::string program;
   bool json = false;
   DaemonAddress daemon;
 };
@@ -115,9 +121,32 @@ void verify(const SessionsArguments& a) {
       for (const std::string& problem : c.problems) std::printf("  %s\n", problem.c_str());
     }
     for (const std::string& problem : check.problems) std::printf("%s\n", problem.c_str());
+    if (check.certified_files > 0)
+      std::printf("%s files as certified, %s\n", std::to_string(check.certified_files).c_str(),
+                  check.certified_by.empty() ? "unsigned" : ("signed by " + check.certified_by).c_str());
     std::printf("%s\n", check.whole() ? "All there." : (check.to_do + ".").c_str());
   }
   if (!check.whole()) throw CLI::RuntimeError(1);
+  if (a.public_key.empty()) return;
+  const std::string trusted = or_fail(read_public_key(a.public_key));
+  if (check.certified_files == 0)
+    fail({ErrorKind::bad_input, "has no certificate", a.folder, "Certify it: emberlock sessions certify"});
+  or_fail(session::check_signer({"", check.certified_by, ""}, trusted, a.folder));
+}
+
+void certify_session(const SessionsArguments& a) {
+  const auto key = or_fail(key_of(a.key));
+  const Interrupt interrupt;
+  const SteadyClock clock;
+  const TimePoint begin = clock.now();
+  const v1::SessionCertificate certificate =
+      or_fail(session::certify_session(a.folder, a.program, key.get(), until_interrupted("certify")));
+  std::uint64_t bytes = 0;
+  for (const v1::HashedFile& file : certificate.files()) bytes += file.bytes();
+  std::printf("%-16s %d, %s, hashed in %.2f s\n", "files", certificate.files_size(), size_of(bytes).c_str(),
+              (clock.now() - begin).value());
+  std::printf("%-16s %s\n", "signed by", key ? key->public_key().c_str() : "nobody");
+  std::printf("%-16s %s\n", "written to", session::certificate_path(a.folder).c_str());
 }
 
 session::RepairReport repair_report_of(const SessionsArguments& a) {
@@ -216,14 +245,27 @@ void add_sessions(CLI::App& app) {
   add_daemon_options(*all, a->daemon);
   all->add_flag("--json", a->json, "One JSON object");
   all->callback([a] { list(*a); });
-  add_verb(
+  CLI::App* verified = add_verb(
       *sessions, "verify",
-      "Reads every frame back and compares it with its checksum. Exit code 1: frames are missing or differ.",
+      "Reads every frame back and compares it with its checksum, and every file with certificate.json, where "
+      "there is one. Exit code 1: frames or files are missing or differ.",
       a, verify);
+  verified->add_option("--public-key", a->public_key,
+                       "The key (PEM) that must have signed the session's certificate");
   add_verb(*sessions, "repair",
            "Repairs a session whose recorder was killed. Of a damaged session it keeps what is good and says "
            "what is lost.",
            a, repair);
+  CLI::App* certify = sessions->add_subcommand(
+      "certify",
+      "Writes certificate.json, the hash of each of a session's files, by which `sessions verify` finds any "
+      "change.");
+  certify->add_option("SESSION", a->folder, "The session's folder")->required();
+  add_key_option(certify, a->key);
+  certify->callback([a, &app] {
+    a->program = app.version();
+    certify_session(*a);
+  });
   CLI::App* out =
       add_verb(*sessions, "export", "Writes frames as files that other programs read.", a, export_frames);
   out->add_option("--out", a->out, "Folder to make; for the daemon's sessions the daemon chooses it");

@@ -18,6 +18,8 @@
 #include "apply/stylize.h"
 #include "base/clock.h"
 #include "base/file.h"
+#include "base/sha256.h"
+#include "cli/certificate_options.h"
 #include "cli/commands.h"
 #include "cli/interrupt.h"
 #include "cli/line_reader.h"
@@ -210,18 +212,25 @@ Status write_edited(const recon::Scene& captured, const recon::Scene& edited, co
   return {};
 }
 
+/// What came out, certified with the steps that made it.
 Result<recon::Report> write(const StylizeArguments& a, const recon::Scene& captured,
-                            apply::Stylization& stylization, OutputFolder& folder) {
+                            apply::Stylization& stylization, recon::Certification certification,
+                            OutputFolder& folder) {
   EMBERLOCK_ASSIGN_OR_RETURN(recon::Outcome outcome, stylization.outcome());
   std::optional<recon::TemperatureField> temperature;
   temperature.swap(outcome.temperature);  // whose errors the page would tell
   const std::string page = report::reconstruct_html(stylization.scene(), outcome);
   temperature.swap(outcome.temperature);
-  EMBERLOCK_RETURN_IF_ERROR(recon::write_outcome_files(outcome, folder.path(), page));
-  EMBERLOCK_RETURN_IF_ERROR(write_edited(captured, stylization.scene(), folder.path() / "edited"));
   apply::EditFile record = stylization.record();
   EMBERLOCK_RETURN_IF_ERROR(keep_objects(record, folder.path()));
-  EMBERLOCK_RETURN_IF_ERROR(write_file_atomically(folder.path() / "edits.json", apply::to_json(record)));
+  const std::string edits = apply::to_json(record);
+  EMBERLOCK_RETURN_IF_ERROR(write_file_atomically(folder.path() / "edits.json", edits));
+  v1::HashedFile& steps = *certification.certificate.add_made_from();
+  steps.set_file("edits.json");
+  steps.set_bytes(edits.size());
+  steps.set_sha256(sha256(edits));
+  EMBERLOCK_RETURN_IF_ERROR(recon::write_outcome_files(outcome, folder.path(), page, certification));
+  EMBERLOCK_RETURN_IF_ERROR(write_edited(captured, stylization.scene(), folder.path() / "edited"));
   EMBERLOCK_RETURN_IF_ERROR(folder.commit());
   std::FILE* const to = a.live ? stderr : stdout;
   std::fprintf(to, "%-16s %d, %zu steps\n", "passes", record.passes, record.steps.size());
@@ -265,6 +274,7 @@ Status stylize(const StylizeArguments& a, ProgressStream* stream) {
   }
   EMBERLOCK_ASSIGN_OR_RETURN(const recon::Scene scene, load_views(a.reconstruct, bar));
   EMBERLOCK_RETURN_IF_ERROR(apply::check_edits(edits, scene, a.edits));
+  EMBERLOCK_ASSIGN_OR_RETURN(Certified certified, certify(a.reconstruct, bar, Interrupt::asked));
   if (stream == nullptr) EMBERLOCK_RETURN_IF_ERROR(view_shown(a, edits, scene));
   const Interrupt interrupt;
   options.solve.stop = Interrupt::asked;
@@ -281,7 +291,8 @@ Status stylize(const StylizeArguments& a, ProgressStream* stream) {
   EMBERLOCK_ASSIGN_OR_RETURN(OutputFolder folder, OutputFolder::create(request));
   EMBERLOCK_RETURN_IF_ERROR(edit(a, edits, scene, begun.report, *stylization, folder.path(), stream));
   if (stream != nullptr) stream->progress(1, "writing the result");
-  EMBERLOCK_ASSIGN_OR_RETURN(const recon::Report report, write(a, scene, *stylization, folder));
+  EMBERLOCK_ASSIGN_OR_RETURN(const recon::Report report,
+                             write(a, scene, *stylization, std::move(certified.certification), folder));
   if (stream != nullptr) stream->written(report, a.out);
   return {};
 }
@@ -336,7 +347,9 @@ void add_stylize(CLI::App& app) {
   add_solve_options(verb, a.reconstruct);
   add_frame_options(verb, a.reconstruct);
   add_picture_options(verb, a.reconstruct);
-  verb->callback([arguments] {
+  add_certificate_options(verb, a.reconstruct.certificate);
+  verb->callback([arguments, &app] {
+    arguments->reconstruct.certificate.program = app.version();
     if (arguments->reconstruct.last_frame)
       fail({ErrorKind::bad_input, "one frame is edited at a time", "--frames", "Give --frame"});
     stylize_command(*arguments);

@@ -23,6 +23,7 @@ int main(int argc, char** argv) {
   emberlock::cli::add_calibrate(app);
   emberlock::cli::add_reconstruct(app);
   emberlock::cli::add_batch(app);
+  emberlock::cli::add_verify_volume(app);
   emberlock::cli::add_view(app);
   emberlock::cli::add_render(app);
   emberlock::cli::add_scene(app);

@@ -11,6 +11,7 @@
 #include "base/in_parallel.h"
 #include "drivers/virtual/virtual_clock.h"
 #include "recon/calibrate/rig.h"
+#include "recon/pipeline/certify.h"
 #include "recon/pipeline/scene.h"
 #include "rig/align/record.h"
 #include "session/async_writer.h"
@@ -220,7 +221,11 @@ Status reconstruct_flame(DemoResult& result, const std::filesystem::path& folder
   EMBERLOCK_ASSIGN_OR_RETURN(result.outcome,
                              recon::reconstruct(result.scene, options, clock, progress("reconstruct")));
   result.outcome.report.input = "flame";
-  EMBERLOCK_RETURN_IF_ERROR(recon::write_outcome(result.outcome, folder / "reconstruction"));
+  recon::FileHashes hashes;
+  recon::Certification certification;
+  EMBERLOCK_ASSIGN_OR_RETURN(certification.certificate, recon::origin_of(folder / "flame", {}, {}, &hashes));
+  EMBERLOCK_RETURN_IF_ERROR(
+      recon::write_outcome(result.outcome, folder / "reconstruction", {}, {}, certification));
   result.kept.emplace_back("reconstruction/: volume.vdb, views/, report.json");
   if (asked(stop)) return {};
   options.solve.solver = recon::Solver::paper;

@@ -22,6 +22,8 @@ Json to_json(const SessionCheck& check) {
   }
   json["problems"] = check.problems;
   json["to_do"] = check.to_do;
+  json["certified_files"] = check.certified_files;
+  json["certified_by"] = check.certified_by;
   return json;
 }
 

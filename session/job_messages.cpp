@@ -51,6 +51,8 @@ v1::JobOutcome to_outcome(const SessionCheck& check) {
   to.set_events(check.events);
   put(check.problems, *to.mutable_problems());
   to.set_to_do(check.to_do);
+  to.set_certified_files(check.certified_files);
+  to.set_certified_by(check.certified_by);
   return outcome;
 }
 
@@ -99,6 +101,8 @@ SessionCheck from_proto(const v1::VerifyReport& report) {
   check.events = report.events();
   check.problems = strings(report.problems());
   check.to_do = report.to_do();
+  check.certified_files = report.certified_files();
+  check.certified_by = report.certified_by();
   return check;
 }
 

@@ -10,6 +10,7 @@
 #include "base/file.h"
 #include "base/in_parallel.h"
 #include "session/camera_reader.h"
+#include "session/certificate.h"
 #include "session/events.h"
 #include "session/files.h"
 #include "session/layout.h"
@@ -144,6 +145,23 @@ void check_events(const fs::path& folder, SessionCheck& check) {
   }
 }
 
+/// What certificate.json says that isn't so. Error: cancelled.
+Status check_certified(const fs::path& folder, const Observer& observer, SessionCheck& check) {
+  const auto certified = check_certificate(folder, observer);
+  EMBERLOCK_RETURN_IF_ERROR(observe(observer, 1, "compared with its certificate"));
+  if (!certified) {
+    check.problems.push_back("certificate.json: " + certified.error().what);
+    return {};
+  }
+  if (!*certified) return {};
+  const CertifiedSession& session = **certified;
+  check.problems.insert(check.problems.end(), session.problems.begin(), session.problems.end());
+  if (!session.problems.empty()) return {};
+  check.certified_files = static_cast<std::uint64_t>(session.certificate.files_size());
+  check.certified_by = session.seal.key;
+  return {};
+}
+
 /// Nothing that could be repaired.
 bool holds_nothing(const SessionCheck& check) {
   return std::all_of(check.cameras.begin(), check.cameras.end(), [](const CameraCheck& c) {
@@ -163,13 +181,17 @@ Result<SessionCheck> verify_session(const fs::path& folder, const Observer& obse
   SessionCheck check;
   check.state = manifest.state();
   check.cameras.resize(static_cast<std::size_t>(manifest.cameras_size()));
+  constexpr double kDecoding = 0.95;  // of the time; hashing is fast beside it
+  const Observer decoding = part_of(observer, 0, kDecoding);
   EMBERLOCK_RETURN_IF_ERROR(
-      in_parallel(check.cameras.size(), observer, [&](std::size_t i, const Observer& seen) -> Status {
+      in_parallel(check.cameras.size(), decoding, [&](std::size_t i, const Observer& seen) -> Status {
         EMBERLOCK_ASSIGN_OR_RETURN(
             check.cameras[i], check_camera(folder, manifest, manifest.cameras(static_cast<int>(i)), seen));
         return {};
       }));
   check_events(folder, check);
+  const bool readable = check.whole();
+  EMBERLOCK_RETURN_IF_ERROR(check_certified(folder, part_of(observer, kDecoding, 1), check));
   if (check.state == v1::Manifest::RECORDING) {
     check.problems.emplace_back(
         "manifest.json: the recording isn't finished: its recorder still runs or was killed");
@@ -177,6 +199,10 @@ Result<SessionCheck> verify_session(const fs::path& folder, const Observer& obse
         "Wait for its recorder; if that was killed, `emberlock sessions repair` keeps what reached the disk";
   } else if (holds_nothing(check)) {
     check.to_do = "Nothing was recorded, or nothing of it is left: record again";
+  } else if (readable && !check.whole()) {
+    check.to_do =
+        "Restore the named files from a copy; if the change was meant, such as a repair, certify the session "
+        "anew";
   } else if (!check.whole()) {
     check.to_do = "Restore the named files from a copy, or let `emberlock sessions repair` keep what is good";
   }

@@ -29,14 +29,17 @@ struct SessionCheck {
   std::uint64_t events = 0;
   std::vector<std::string> problems;  ///< those that belong to no single camera
   std::string to_do;                  ///< one sentence; empty if there is nothing to do
+  std::uint64_t certified_files = 0;  ///< that certificate.json tells of and that are as it says; 0: without
+  std::string certified_by;           ///< the public key that signed it; empty: none did
 
   /// Finished and complete: every camera has at least one frame and all recorded frames.
   [[nodiscard]] bool whole() const;
 };
 
 /// Reads everything back: decodes every frame and compares it with its hash; compares index, events, segments
-/// and counts with each other; finds frames that are in segments but not in the index. Changes nothing.
-/// Errors: bad_input (no session, or an unreadable manifest), refused (cancelled by the observer).
+/// and counts with each other; finds frames that are in segments but not in the index; compares every file
+/// with certificate.json, where there is one. Changes nothing. Errors: bad_input (no session, or an
+/// unreadable manifest), refused (cancelled by the observer).
 Result<SessionCheck> verify_session(const std::filesystem::path& folder, const Observer& observer = {});
 
 struct RepairedCamera {

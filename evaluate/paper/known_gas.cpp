@@ -203,8 +203,8 @@ Result<KnownGas> as_the_paper_renders(const KnownGas& gas, int steps, const reco
 
 Status write_gas(const KnownGas& gas, const std::filesystem::path& path) {
   return recon::write_volume(
-      gas.light, path,
-      {{"temperature", "K", gas.gas.temperature}, {"absorption", "1/m", gas.gas.absorption}});
+      gas.light, path, {{"temperature", "K", gas.gas.temperature}, {"absorption", "1/m", gas.gas.absorption}},
+      {}, recon::simulated());
 }
 
 Result<KnownGas> read_gas(Subject subject, const std::filesystem::path& path,

@@ -9,6 +9,7 @@
 
 #include "base/result.h"
 #include "recon/effects/lighting.h"
+#include "recon/export/certificate.h"
 #include "recon/kernels/grid.h"
 
 // A volume as other programs open it: the grids of its volume.vdb with the names and units that they have
@@ -37,6 +38,7 @@ struct SharedVolume {
   Grid grid;
   std::vector<SharedGrid> grids;
   Provenance provenance;
+  Certification certification = {};  ///< of OpenVDB files; others have no place that all bytes are sealed in
 
   [[nodiscard]] const SharedGrid* find(const std::string& name) const;
 };

@@ -140,8 +140,12 @@ Status check_size(const Grid& grid, const std::filesystem::path& path) {
 }
 
 /// `end` stands behind what OpenVDB reads.
-Status write_file(const openvdb::GridPtrVec& grids, const openvdb::MetaMap& about,
-                  const std::filesystem::path& path, std::string_view end) try {
+Status write_file(const openvdb::GridPtrVec& grids, openvdb::MetaMap about, const std::filesystem::path& path,
+                  std::string_view end, const Certification& certification) try {
+  const SigningKey* const key = certification.key.get();
+  EMBERLOCK_ASSIGN_OR_RETURN(const std::string text,
+                             session::certificate_text(certification.certificate, key));
+  about.insertMeta(kCertificateKey, openvdb::StringMetadata(text));
   openvdb::io::File file(path.string());
   file.write(grids, about);
   file.close();
@@ -150,7 +154,7 @@ Status write_file(const openvdb::GridPtrVec& grids, const openvdb::MetaMap& abou
   behind << end;
   behind.close();
   identify_by_content(path);
-  return {};
+  return seal_volume(path, key);
 } catch (const std::bad_alloc&) {
   throw;  // of memory, not of the disk
 } catch (const std::exception& e) {
@@ -288,7 +292,8 @@ openvdb::MetaMap metadata_of(const Provenance& from) {
 }  // namespace
 
 Status write_volume(const Volume& volume, const std::filesystem::path& path,
-                    const std::vector<NamedGrid>& further, const Lighting& lighting) {
+                    const std::vector<NamedGrid>& further, const Lighting& lighting,
+                    const Certification& certification) {
   openvdb::initialize();
   EMBERLOCK_RETURN_IF_ERROR(check_size(volume.grid, path));
   const auto& emission = volume.emission;
@@ -304,7 +309,7 @@ Status write_volume(const Volume& volume, const std::filesystem::path& path,
   openvdb::GridPtrVec grids{emission_grid, density_grid};
   for (const NamedGrid& grid : further)
     grids.push_back(grid_of(volume.grid, grid.name, grid.unit, grid.values));
-  return write_file(grids, metadata_of(lighting), path, kEnd);
+  return write_file(grids, metadata_of(lighting), path, kEnd, certification);
 }
 
 Result<Volume> read_volume(const std::filesystem::path& path) try {
@@ -407,7 +412,7 @@ Status write_vdb(const SharedVolume& volume, const std::filesystem::path& path, 
   };
   for (const SharedGrid& from : volume.grids) add(from);
   if (volume.find("density") == nullptr) add({"density", "1/m", "", std::vector<float>(volume.grid.size())});
-  return write_file(grids, about, path, later ? kEndLater : kEnd);
+  return write_file(grids, about, path, later ? kEndLater : kEnd, volume.certification);
 }
 
 }  // namespace emberlock::recon

@@ -8,6 +8,7 @@
 
 #include "base/result.h"
 #include "recon/effects/lighting.h"
+#include "recon/export/certificate.h"
 #include "recon/export/shared_volume.h"
 #include "recon/render/volume.h"
 
@@ -31,9 +32,11 @@ struct NamedGrid {
 /// `emberlock_scattering` (single or multiple), `emberlock_albedo` and `emberlock_asymmetry`, of light that
 /// isn't in `emission`; `emberlock_light` (even, distant or nearby), `_place` (towards it, or metres),
 /// `_strength` and `_ambient` (grey levels, as Light has them), of light whose scattered part is `emission`.
+/// `emberlock_certificate` tells what the volume was made from (certificate.h).
 /// `path` is written in place: call it inside an OutputFolder.
 Status write_volume(const Volume& volume, const std::filesystem::path& path,
-                    const std::vector<NamedGrid>& further = {}, const Lighting& lighting = {});
+                    const std::vector<NamedGrid>& further = {}, const Lighting& lighting = {},
+                    const Certification& certification = {});
 
 /// Reads a file of write_volume(), bit-identically; a density without active points becomes an empty
 /// extinction. Errors: not an OpenVDB file; missing grids or metadata.
@@ -66,8 +69,9 @@ enum class VdbSamples {
 /// point of class FOG_VOLUME; a scalar grid `density` even where nothing is dense, as without one Blender's
 /// Principled Volume takes the whole box for dense. Meaning and unit of a grid and where the volume comes
 /// from stand in its metadata (`meaning`, `unit`, `creator`, `emberlock_input`, `emberlock_frame`,
-/// `emberlock_up`, and what the medium scatters, as write_volume() has it), and the latter in the file's. At
-/// the index, read_volume() and read_lighting() read it too. Errors: as write_volume().
+/// `emberlock_up`, and what the medium scatters, as write_volume() has it), and the latter in the file's,
+/// with its certificate. At the index, read_volume() and read_lighting() read it too. Errors: as
+/// write_volume().
 Status write_vdb(const SharedVolume& volume, const std::filesystem::path& path, VdbSamples samples);
 
 }  // namespace emberlock::recon

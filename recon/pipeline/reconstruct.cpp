@@ -14,6 +14,7 @@
 #include "recon/adjust/prepared_scene.h"
 #include "recon/export/picture.h"
 #include "recon/export/volume_file.h"
+#include "recon/pipeline/certify.h"
 #include "recon/pipeline/planned_run.h"
 #include "recon/pipeline/planned_time.h"
 #include "recon/pipeline/voxel_choice.h"
@@ -218,17 +219,20 @@ Status check_output(const fs::path& folder, const std::vector<fs::path>& inputs)
 }
 
 Status write_outcome(const Outcome& outcome, const fs::path& folder, const std::vector<fs::path>& inputs,
-                     std::string_view page) {
+                     std::string_view page, const Certification& certification) {
   EMBERLOCK_ASSIGN_OR_RETURN(OutputFolder staging, OutputFolder::create({folder, kReconstruct, inputs}));
-  EMBERLOCK_RETURN_IF_ERROR(write_outcome_files(outcome, staging.path(), page));
+  EMBERLOCK_RETURN_IF_ERROR(write_outcome_files(outcome, staging.path(), page, certification));
   return staging.commit();
 }
 
-Status write_outcome_files(const Outcome& outcome, const fs::path& folder, std::string_view page) {
+Status write_outcome_files(const Outcome& outcome, const fs::path& folder, std::string_view page,
+                           const Certification& certification) {
+  Certification told = certification;
+  tell_reconstruction(outcome.report, *told.certificate.mutable_reconstruction());
   const FurtherGrids further(outcome);
   const Effects& effects = outcome.reconstruction.effects;
   EMBERLOCK_RETURN_IF_ERROR(write_volume(outcome.reconstruction.volume, folder / "volume.vdb", further.grids,
-                                         {effects.scattering, effects.light}));
+                                         {effects.scattering, effects.light}, told));
   std::error_code ec;
   fs::create_directory(folder / "views", ec);
   for (std::size_t i = 0; i < outcome.renders.size(); ++i) {

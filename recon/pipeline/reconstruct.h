@@ -16,6 +16,7 @@
 #include "recon/adjust/find_pointing.h"
 #include "recon/adjust/solver.h"
 #include "recon/effects/effects.h"
+#include "recon/export/certificate.h"
 #include "recon/export/report.h"
 #include "recon/preprocess/view.h"
 #include "recon/temperature/temperature.h"
@@ -105,11 +106,13 @@ Status check_output(const std::filesystem::path& folder,
 /// `emission_noise` and `density_noise` where it is known what of them noise makes, `temperature` and
 /// `temperature_sigma`, if it is known, in K, active where told, and for each line emitter that was looked
 /// for `line_NAME`, its share of the light), views/NNNN.png (8 bits, numbered as in the input) and
-/// report.json as an OutputFolder; and `page` as report.html, unless it is empty.
+/// report.json as an OutputFolder; and `page` as report.html, unless it is empty. The volume carries a
+/// certificate, of which `certification` tells where the scene came from (certify.h).
 Status write_outcome(const Outcome& outcome, const std::filesystem::path& folder,
-                     const std::vector<std::filesystem::path>& inputs = {}, std::string_view page = {});
+                     const std::vector<std::filesystem::path>& inputs = {}, std::string_view page = {},
+                     const Certification& certification = {});
 /// The same files in a folder that is there, such as an OutputFolder's.
 Status write_outcome_files(const Outcome& outcome, const std::filesystem::path& folder,
-                           std::string_view page = {});
+                           std::string_view page = {}, const Certification& certification = {});
 
 }  // namespace emberlock::recon

@@ -82,13 +82,16 @@ std::size_t middle_frame(const session::SessionReader& reader) {
 }
 
 /// How late a frame is. One that stands in for a lost one is late, or early, by whole periods more.
-void tell_lateness(const session::SessionReader& reader, std::size_t camera, std::size_t frame,
-                   TimePoint instant, const v1::ShutterTimes::Camera& times, View& view) {
+Seconds lateness_of(const session::SessionReader& reader, std::size_t camera, std::size_t frame,
+                    TimePoint instant, const v1::ShutterTimes::Camera& times) {
   const double rate = reader.manifest().cameras(static_cast<int>(camera)).frame_rate_hz();
   const Seconds after = reader.stamps(camera)[frame].monotonic_time - instant;
   const double periods = rate > 0 ? std::round(after.value() * rate) : 0;
-  view.lateness = Seconds(times.late_s(static_cast<int>(frame)) + (rate > 0 ? periods / rate : 0));
-  view.lateness_sigma = Seconds(times.sigma_s());
+  return Seconds(times.late_s(static_cast<int>(frame)) + (rate > 0 ? periods / rate : 0));
+}
+
+std::size_t frame_asked_for(const session::SessionReader& reader, std::optional<std::size_t> frame) {
+  return frame ? *frame : reader.stamps(0).empty() ? 0 : middle_frame(reader);
 }
 
 /// The cameras of a session, of which each can be read by a thread of its own.
@@ -249,7 +252,11 @@ Result<Filmed> view_of(session::SessionReader& reader, std::size_t i, const v1::
                  reader.folder().string() + ": camera " + stream.camera_id(),
                  "Choose another --frame; the index tells which frames were lost"};
   }
-  if (times) tell_lateness(reader, i, *nearest, instant.time, times->cameras(static_cast<int>(i)), view);
+  if (times) {
+    const v1::ShutterTimes::Camera& told = times->cameras(static_cast<int>(i));
+    view.lateness = lateness_of(reader, i, *nearest, instant.time, told);
+    view.lateness_sigma = Seconds(told.sigma_s());
+  }
   EMBERLOCK_ASSIGN_OR_RETURN(const Frame shown, reader.read(i, *nearest));
   EMBERLOCK_ASSIGN_OR_RETURN(filmed.developer,
                              FrameDeveloper::create(reader, i, stream, shown, *nearest, options.frames));
@@ -261,6 +268,25 @@ Result<Filmed> view_of(session::SessionReader& reader, std::size_t i, const v1::
 }
 
 }  // namespace
+
+std::vector<std::optional<FilmedFrame>> filmed_frames(const session::SessionReader& reader,
+                                                      const std::optional<v1::ShutterTimes>& times,
+                                                      std::optional<std::size_t> frame) {
+  std::vector<std::optional<FilmedFrame>> filmed(reader.camera_count());
+  const std::size_t asked = reader.camera_count() == 0 ? 0 : frame_asked_for(reader, frame);
+  if (filmed.empty() || asked >= reader.stamps(0).size()) return filmed;
+  const TimePoint instant = reader.stamps(0)[asked].monotonic_time;
+  for (std::size_t i = 0; i < filmed.size(); ++i) {
+    const auto nearest = frame_at(reader, i, instant);
+    if (!nearest) continue;
+    filmed[i] = FilmedFrame{*nearest, std::nullopt, Seconds(0)};
+    if (!times) continue;
+    const v1::ShutterTimes::Camera& told = times->cameras(static_cast<int>(i));
+    filmed[i]->late = lateness_of(reader, i, *nearest, instant, told);
+    filmed[i]->late_sigma = Seconds(told.sigma_s());
+  }
+  return filmed;
+}
 
 Result<Scene> load_session(const fs::path& folder, const SceneOptions& options) {
   EMBERLOCK_ASSIGN_OR_RETURN(session::SessionReader reader, session::SessionReader::open(folder));
@@ -282,7 +308,7 @@ Result<Scene> load_session(const fs::path& folder, const SceneOptions& options) 
                  manifest_name + ": cameras", "Record between 1 and 64 cameras"};
   }
   const std::vector<FrameStamp>& first = reader.stamps(0);
-  const std::size_t frame = options.frame ? *options.frame : first.empty() ? 0 : middle_frame(reader);
+  const std::size_t frame = frame_asked_for(reader, options.frame);
   if (frame >= first.size()) {
     return Error{
         ErrorKind::bad_input,

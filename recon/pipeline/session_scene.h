@@ -1,13 +1,30 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cstddef>
 #include <filesystem>
+#include <optional>
+#include <vector>
 
+#include "base/quantity.h"
 #include "recon/pipeline/scene.h"
+#include "session/reader.h"
 
 namespace emberlock::recon {
 
 /// load_scene() of a recorded session. Its cameras are read and developed at once, by options.threads.
 Result<Scene> load_session(const std::filesystem::path& folder, const SceneOptions& options);
+
+/// A camera's frame that stands for an instant.
+struct FilmedFrame {
+  std::size_t frame = 0;        ///< of the camera
+  std::optional<Seconds> late;  ///< later than the instant, where times.json tells
+  Seconds late_sigma{0};
+};
+/// Those that load_session() makes a scene of, of each camera; nothing of one that has none. `frame`: of the
+/// first camera, as SceneOptions has it.
+std::vector<std::optional<FilmedFrame>> filmed_frames(const session::SessionReader& reader,
+                                                      const std::optional<v1::ShutterTimes>& times,
+                                                      std::optional<std::size_t> frame);
 
 }  // namespace emberlock::recon

@@ -273,7 +273,8 @@ class Filming {
     recon::Volume volume = recon::visible_gas(gas, response_, sun_, options_.compute);
     for (float& e : volume.emission) e *= static_cast<float>(film_.gain);
     return recon::write_volume(volume, folder_ / "truth" / fmt::format("frame-{:04}.vdb", frame),
-                               {{"temperature", "K", gas.temperature}, {"velocity", "m/s", gas.velocity}});
+                               {{"temperature", "K", gas.temperature}, {"velocity", "m/s", gas.velocity}}, {},
+                               recon::simulated());
   }
   Status expose() {
     float brightest = 0;

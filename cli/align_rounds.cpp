@@ -2,6 +2,7 @@
 #include "cli/align_rounds.h"
 
 #include <algorithm>
+#include <cmath>
 #include <cstddef>
 #include <utility>
 
@@ -128,6 +129,11 @@ std::string align_summary(const rig::AlignRunResult& result) {
                                                                  : "NOT aligned",
                   last.round, result.resets, name(result.options.policy),
                   words(result.options.tolerance, row), row.value() * 1e6, result.words.reason);
+  if (!result.offsets.empty())
+    text +=
+        fmt::format("  staggered: {} instants a second, {:.3f} ms apart\n",
+                    std::lround(static_cast<double>(result.offsets.size()) / result.options.period.value()),
+                    in_milliseconds(result.options.period / static_cast<double>(result.offsets.size())));
   if (result.checks > 0) text += fmt::format("  held by {} checks\n", result.checks);
   for (std::size_t i = 0; i < result.cameras.size(); ++i)
     text += sensor_line(result.cameras[i], result.row_clocks[i], result.exposures[i]);

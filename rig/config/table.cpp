@@ -25,6 +25,9 @@ Section<DaemonConfig> make_alignment_section() {
       {choice<C>("at_start", EMBERLOCK_AT(alignment.at_start),
                  {{"nothing", AtStart::nothing}, {"align", AtStart::align}},
                  "Whether the daemon begins to align by itself once the cameras film."),
+       choice<C>("instants", EMBERLOCK_AT(alignment.stagger), {{"common", false}, {"staggered", true}},
+                 "\"common\": all cameras film at one instant. \"staggered\": each at its own, spread evenly "
+                 "over the frame period, the cameras in the order in which they stand around the flame."),
        number<C>("flame_speed_m_s", EMBERLOCK_AT(alignment.flame.speed), {0.001, 10000},
                  "Speed of what moves fastest in the flame, in metres per second."),
        number<C>("detail_mm", EMBERLOCK_AT(alignment.flame.detail), {0.001, 10000, kMilli},

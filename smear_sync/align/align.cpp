@@ -272,6 +272,17 @@ AlignRound without_delay(AlignRound round, Seconds period) {
   return round;
 }
 
+/// The round as it would be if every camera's own instant were the target: its read phase earlier by its
+/// offset, tau later. Nobody else knows of offsets but who is told its own target.
+AlignRound without_offsets(AlignRound round, const std::vector<AlignCamera>& cameras, Seconds period) {
+  for (std::size_t i = 0; i < cameras.size(); ++i) {
+    Phase& phase = round.cameras[i].phase;
+    if (phase.state == PhaseState::known && cameras[i].offset != Seconds(0))
+      phase.tau = wrap_positive(phase.tau + cameras[i].offset, period);
+  }
+  return round;
+}
+
 /// One round of flashes whose delay is known.
 AlignStep step_at(const AlignState& before, const AlignRound& delayed,
                   const std::vector<AlignCamera>& cameras, const AlignOptions& options) {
@@ -338,8 +349,9 @@ TrackOptions track_options(const AlignOptions& options) {
   return {.period = options.period, .rate_spread = options.rate_spread, .rate_wander = options.rate_wander};
 }
 
-AlignStep align_step(const AlignState& before, const AlignRound& round,
+AlignStep align_step(const AlignState& before, const AlignRound& filmed,
                      const std::vector<AlignCamera>& cameras, const AlignOptions& options) {
+  const AlignRound round = without_offsets(filmed, cameras, options.period);
   if (!options.dial) return step_at(before, round, cameras, options);
   AlignState state = before;
   state.cameras.resize(cameras.size());

@@ -36,12 +36,13 @@ Status check_stagger(std::size_t cameras, Seconds period, Seconds tolerance) {
                  "Connect at least two cameras, or align to one common instant"};
   const Seconds apart = period / static_cast<double>(cameras);
   if (tolerance < apart / 2) return {};
-  return Error{ErrorKind::bad_input,
-               fmt::format("{} staggered cameras are {:.3f} ms apart, and a tolerance of {:.3f} ms mixes them up",
-                           cameras, in_milliseconds(apart), in_milliseconds(tolerance)),
-               "stagger",
-               fmt::format("Ask for a tolerance of less than {:.3f} ms, or align to one common instant",
-                           in_milliseconds(apart / 2))};
+  return Error{
+      ErrorKind::bad_input,
+      fmt::format("{} staggered cameras are {:.3f} ms apart, and a tolerance of {:.3f} ms mixes them up",
+                  cameras, in_milliseconds(apart), in_milliseconds(tolerance)),
+      "stagger",
+      fmt::format("Ask for a tolerance of less than {:.3f} ms, or align to one common instant",
+                  in_milliseconds(apart / 2))};
 }
 
 bool staggered(const std::vector<AlignCamera>& cameras) {

@@ -26,10 +26,7 @@ std::vector<AlignCamera> staggered_rig(std::size_t n) {
 }
 
 AlignOptions stagger_options(AlignPolicy policy) {
-  return {.policy = policy,
-          .tolerance = {milliseconds(0.5)},
-          .period = kPeriod,
-          .strobe_step = Seconds(0)};
+  return {.policy = policy, .tolerance = {milliseconds(0.5)}, .period = kPeriod, .strobe_step = Seconds(0)};
 }
 
 /// Cameras that read later than `common` by these times.
@@ -49,7 +46,8 @@ TEST(Stagger, InstantsLieEvenlyOnTheCircle) {
     std::vector<Seconds> offsets = staggered_offsets(n, kPeriod);
     std::sort(offsets.begin(), offsets.end());
     for (std::size_t k = 0; k < n; ++k)
-      EXPECT_NEAR(offsets[k].value(), kPeriod.value() * static_cast<double>(k) / static_cast<double>(n), 1e-15);
+      EXPECT_NEAR(offsets[k].value(), kPeriod.value() * static_cast<double>(k) / static_cast<double>(n),
+                  1e-15);
   }
 }
 
@@ -65,8 +63,7 @@ TEST(Stagger, NeighboursInARowAreFarApartInTime) {
 
 TEST(Stagger, EveryCameraAtItsOwnInstantIsAligned) {
   const std::vector<AlignCamera> cameras = staggered_rig(11);
-  for (const AlignPolicy policy :
-       {AlignPolicy::fixed_reference, AlignPolicy::densest, AlignPolicy::timed}) {
+  for (const AlignPolicy policy : {AlignPolicy::fixed_reference, AlignPolicy::densest, AlignPolicy::timed}) {
     const AlignRound round = reading_late(milliseconds(7), staggered_offsets(11, kPeriod));
     const AlignDecision decision = align_step({}, round, cameras, stagger_options(policy)).decision;
     EXPECT_EQ(decision.verdict, AlignVerdict::aligned);
@@ -85,8 +82,8 @@ TEST(Stagger, CamerasAtOneInstantAreNot) {
   EXPECT_EQ(decision.verdict, AlignVerdict::go_on);
   for (std::size_t i = 1; i < 6; ++i) {
     // It reads early by its offset, and goes to its instant the shorter way round.
-    EXPECT_NEAR(decision.cameras[i].error->value(),
-                wrap_symmetric(cameras[i].offset, kPeriod).value(), 1e-12);
+    EXPECT_NEAR(decision.cameras[i].error->value(), wrap_symmetric(cameras[i].offset, kPeriod).value(),
+                1e-12);
     EXPECT_TRUE(decision.cameras[i].reset);
     EXPECT_THAT(words(decision, round, cameras, options).cameras[i], HasSubstr("its own instant"));
   }
@@ -98,7 +95,8 @@ TEST(Stagger, ATimedResetAimsAtTheCamerasOwnInstant) {
   std::vector<Seconds> late = staggered_offsets(4, kPeriod);
   late[2] += milliseconds(4);
   const AlignDecision decision =
-      align_step({}, reading_late(milliseconds(7), late), cameras, stagger_options(AlignPolicy::timed)).decision;
+      align_step({}, reading_late(milliseconds(7), late), cameras, stagger_options(AlignPolicy::timed))
+          .decision;
   ASSERT_TRUE(decision.cameras[2].moment);
   // Its stamps shall come 4 ms earlier, 9 ms after the order.
   const Seconds ordered = *decision.cameras[2].moment - TimePoint{};
@@ -112,7 +110,8 @@ TEST(Stagger, OneCameraHasNoOffsetAndIsRefused) {
 
 TEST(Stagger, AToleranceThatMixesInstantsUpIsRefused) {
   EXPECT_TRUE(check_stagger(11, kPeriod, milliseconds(1.8)).ok());
-  EXPECT_THAT(check_stagger(11, kPeriod, milliseconds(1.9)).error().message(), HasSubstr("less than 1.894 ms"));
+  EXPECT_THAT(check_stagger(11, kPeriod, milliseconds(1.9)).error().message(),
+              HasSubstr("less than 1.894 ms"));
 }
 
 }  // namespace

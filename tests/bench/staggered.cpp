@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What staggered cameras buy and cost: held-out errors of simulated flames whose truth is known at every instant, filmed at
-// 24 frames/s at once and staggered, at frames and between them.
+// What staggered cameras buy and cost: held-out errors of simulated flames whose truth is known at every
+// instant, filmed at 24 frames/s at once and staggered, at frames and between them.
 //   bench_staggered speeds|cameras|orders [SEEDS [VOXELS]]   eleven cameras and several speeds, one speed and
 //                                                            several numbers of cameras, or orders in time
 #include <algorithm>
@@ -122,9 +122,9 @@ void interpolate(const Film& film, Errors& errors) {
   const recon::Hull& hull = first.reconstruction.hull;
   errors.of[shown] = error_of(a, hull, effects, truth);
   errors.of[blended] = error_of(halfway(a, b), hull, effects, truth);
-  errors.of[carried] = error_of(halfway(recon::carried(a, scaled(flow, 0.5F), pool),
-                                        recon::carried(b, scaled(flow, -0.5F), pool)),
-                                hull, effects, truth);
+  errors.of[carried] = error_of(
+      halfway(recon::carried(a, scaled(flow, 0.5F), pool), recon::carried(b, scaled(flow, -0.5F), pool)),
+      hull, effects, truth);
 }
 
 /// RMS over some instants at which a camera films, and over those halfway to the next.
@@ -134,7 +134,8 @@ void film_staggered(const Film& film, const std::vector<Seconds>& offsets, Error
   double sums[2] = {};
   for (int i = 0; i < kInstants; ++i)
     for (const bool halfway : {false, true}) {
-      const double place = std::round(static_cast<double>(i * film.cameras) / kInstants) + (halfway ? 0.5 : 0);
+      const double place =
+          std::round(static_cast<double>(i * film.cameras) / kInstants) + (halfway ? 0.5 : 0);
       const Solved one = solved(staggered(film, offsets, place * apart));
       sums[halfway ? 1 : 0] += one.error * one.error / kInstants;
       errors.rise += one.rise / (2 * kInstants);
@@ -166,9 +167,11 @@ void line(const std::string& what, Film film, int seeds, const Measure& measure)
 }
 
 void head(const char* what) {
-  std::printf("| %s | at once: at frames | half a period later: the frame's | mean of two | carried halfway | "
-              "staggered: at frames | between | between / at, worst flame | found, m/s |\n"
-              "|---|---|---|---|---|---|---|---|---|\n", what);
+  std::printf(
+      "| %s | at once: at frames | half a period later: the frame's | mean of two | carried halfway | "
+      "staggered: at frames | between | between / at, worst flame | found, m/s |\n"
+      "|---|---|---|---|---|---|---|---|---|\n",
+      what);
 }
 
 void measure_all(const Film& film, Errors& errors) {

@@ -87,7 +87,8 @@ class FramesInTurn {
   }
   [[nodiscard]] OutputRequest request() const { return {out_ / "sequence", kSequence}; }
   [[nodiscard]] std::string label() const {
-    return fmt::format("frame {} ({} of {})", frames_[at_], at_ + 1, frames_.size());
+    return fmt::format("{} {} ({} of {})", arguments_.instants > 1 ? "instant" : "frame", frames_[at_],
+                       at_ + 1, frames_.size());
   }
   [[nodiscard]] ReconstructArguments arguments_of(std::uint64_t frame) const {
     return cli::arguments_of(arguments_, frame, folder_of(frame));

@@ -83,7 +83,7 @@ TEST(AlignRun, StaggeringNeedsSeveralCamerasOfOneRateAndInstantsTheToleranceTell
   EXPECT_THAT(rig::run_align(bench.align, bench.options).error().message(), HasSubstr("mixes them up"));
   bench.options.offsets.pop_back();
   EXPECT_THAT(rig::run_align(bench.align, bench.options).error().message(), HasSubstr("go by camera"));
-  setup.cameras[2].timing.frame_period *= 1.001;
+  setup.cameras[2].nominal_rate = Hertz(1.001 * setup.cameras[2].nominal_rate.value());
   SmallBench unequal(setup);
   EXPECT_THAT(rig::stagger(unequal.align.cameras).error().message(), HasSubstr("one frame rate"));
 }

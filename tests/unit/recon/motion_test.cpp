@@ -53,6 +53,21 @@ double heldout(const Scene& scene, const Effects& effects) {
 
 Motion rising(double speed) { return {Motion::Carry::uniform, {0, 0, speed}}; }
 
+TEST(MotionTest, APictureOfAFlameThatHasLeftTheBoxIsRefused) {
+  Scene scene;
+  scene.box.size = Eigen::Vector3d(0.1, 0.1, 0.3);
+  for (const double late : {0.0, 0.02, -0.02}) {
+    scene.views.emplace_back().name = "late";
+    scene.views.back().lateness = Seconds(late);
+  }
+  EXPECT_TRUE(check_carried(scene, {}).ok());
+  EXPECT_TRUE(check_carried(scene, rising(7.4)).ok());
+  EXPECT_EQ(check_carried(scene, rising(7.6)).error().kind, ErrorKind::refused);
+  EXPECT_FALSE(check_carried(scene, {Motion::Carry::uniform, {6, 6, 0}}).ok());
+  for (View& view : scene.views) view.lateness = Seconds(0);
+  EXPECT_TRUE(check_carried(scene, rising(100)).ok());
+}
+
 TEST(MotionTest, AMovedCameraSeesTheCarriedPointWhereItsOwnSawItLate) {
   View view;
   view.camera =

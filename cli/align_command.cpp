@@ -200,7 +200,7 @@ DaemonAlignment asked_of_daemon(const AlignArguments& arguments, const CLI::App&
   return wanted;
 }
 
-/// Adds the options that say how near and for how long.
+/// Adds the options that say to what, how near and for how long.
 void add_tolerance(CLI::App* verb, AlignArguments& a) {
   auto* tolerance = verb->add_option(
       "--tolerance", a.tolerance,
@@ -219,6 +219,10 @@ void add_tolerance(CLI::App* verb, AlignArguments& a) {
           "aligned means: surely for so many seconds, as far as measured drifts and resets can make it")
       ->check(CLI::Range(0.0, 3600.0))
       ->capture_default_str();
+  verb->add_flag("--stagger", a.stagger,
+                 "each camera to its own instant, spread evenly over the frame period: eleven cameras of 24 "
+                 "frames/s then see 264 instants a second (docs/staggered.md). Cameras in the order in which "
+                 "they stand around the flame");
 }
 
 /// Adds the options that limit an alignment.
@@ -263,10 +267,6 @@ void add_align(CLI::App& app) {
       ->needs(rig)
       ->capture_default_str();
   add_tolerance(verb, *arguments);
-  verb->add_flag("--stagger", arguments->stagger,
-                 "each camera to its own instant, spread evenly over the frame period: eleven cameras of 24 "
-                 "frames/s then see 264 instants a second (docs/staggered.md). Cameras in the order in which "
-                 "they stand around the flame");
   verb->add_option("--policy", arguments->policy, "fixed-reference (the paper's), densest, timed or trimmed")
       ->capture_default_str();
   verb->add_option("--seed", arguments->seed, "seed of the virtual rig and of the moments of untimed resets")

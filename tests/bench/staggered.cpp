@@ -195,7 +195,7 @@ int main(int argc, char** argv) {
   std::printf("held-out RMS, grey levels, over %d flames; %d voxels, 24 frames/s\n\n", 2 * seeds, voxels);
   if (what == "speeds") {
     head("flame's speed, m/s");
-    for (const double speed : {0.1, 0.25, 0.5, 1.0, 2.0})
+    for (const double speed : {0.1, 0.25, 0.5, 1.0, 2.0, 4.0})
       line(std::to_string(speed).substr(0, 4), {.speed = speed}, seeds, measure_all);
   } else if (what == "cameras") {
     head("cameras, 1 m/s");

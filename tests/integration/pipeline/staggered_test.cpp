@@ -43,8 +43,8 @@ class Staggered : public testing::Test {
   static fs::path session() { return folder() / "film" / "session"; }
   [[nodiscard]] test::VerbRun reconstruct(const fs::path& input, const std::string& frames,
                                           const std::vector<std::string>& more) const {
-    std::vector<std::string> words = {"reconstruct", input.string(), "--frames", frames, "--out",
-                                      out().string(), "--voxels", "16", "--device", "cpu"};
+    std::vector<std::string> words = {"reconstruct",  input.string(), "--frames", frames,     "--out",
+                                      out().string(), "--voxels",     "16",       "--device", "cpu"};
     words.insert(words.end(), more.begin(), more.end());
     return test::run_verb(add_reconstruct, words);
   }
@@ -96,8 +96,8 @@ TEST_F(Staggered, TheFirstFrameLacksPicturesFromBefore) {
   const test::VerbRun run = reconstruct(session(), "0:0", {"--instants", "3"});
   EXPECT_EQ(run.exit_code, 1);
   EXPECT_THAT(run.err, HasSubstr("has no complete frame within half a frame period"));
-  const test::VerbRun single = test::run_verb(
-      add_reconstruct, {"reconstruct", "session", "--out", out().string(), "--instants", "3"});
+  const test::VerbRun single =
+      test::run_verb(add_reconstruct, {"reconstruct", "session", "--out", out().string(), "--instants", "3"});
   EXPECT_EQ(single.exit_code, 2);
   EXPECT_THAT(single.err, HasSubstr("--instants requires --frames or --last-frame"));
 }

@@ -141,7 +141,7 @@ std::string align_summary(const rig::AlignRunResult& result) {
   for (std::size_t i = 0; i < last.cameras.size(); ++i)
     points.push_back({result.cameras[i].id, last.cameras[i].error});
   if (std::any_of(points.begin(), points.end(), [](const CirclePoint& p) { return p.error.has_value(); }))
-    text += phase_circle(points, result.options.period, tolerance * row, row);
+    text += phase_circle(points, result.options.period, tolerance * row, row, !result.offsets.empty());
   return text;
 }
 

@@ -14,6 +14,7 @@
 #include "smear_sync/align/align_look.h"
 #include "smear_sync/align/align_trim.h"
 #include "smear_sync/align/reset_delay.h"
+#include "smear_sync/align/stagger.h"
 
 namespace emberlock::smear {
 namespace {
@@ -248,7 +249,9 @@ void decide(AlignState& state, AlignDecision& decision, const std::vector<Drift>
   }
   ask_for_one(state, decision, c);
   ask_for_moves(state, decision, c, looks);
-  if (decision.verdict == AlignVerdict::aligned) look_for_blind(decision, c);
+  // Of staggered cameras some are blind at any delay: as long as drifts are measured they take turns.
+  const bool measures = decision.reason.cause == AlignCause::drift_unknown && staggered(c.cameras);
+  if (decision.verdict == AlignVerdict::aligned || measures) look_for_blind(decision, c);
   decision.reference = nearest(decision, c.options);
   foresee(state, decision, drifts, c);
 }

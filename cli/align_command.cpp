@@ -19,6 +19,7 @@
 #include "rig/align/json.h"
 #include "rig/align/record.h"
 #include "rig/align/run.h"
+#include "rig/align/stagger.h"
 #include "smear_sync/align/align.h"
 
 namespace emberlock::cli {
@@ -52,6 +53,7 @@ struct AlignArguments {
   std::string delays;
   DaemonAlignment by_daemon;
   bool anyway = false;
+  bool stagger = false;
 };
 
 /// Prints the rounds: JSON lines or words on stdout.
@@ -129,6 +131,10 @@ Result<rig::AlignRunResult> align_live(const AlignArguments& arguments, const ri
   rig::AlignRig rig{{}, &virtual_rig->strobe(), &virtual_rig->clock(), nullptr};
   for (int i = 0; i < virtual_rig->size(); ++i) rig.cameras.push_back(&virtual_rig->camera(i));
 
+  if (arguments.stagger) {
+    EMBERLOCK_ASSIGN_OR_RETURN(options.offsets, rig::stagger(rig.cameras));
+  }
+
   const rig::AlignObserver operating = operated(virtual_rig->dial(), strobe.at, observer);
   if (!arguments.delays.empty() && std::filesystem::exists(arguments.delays)) {
     EMBERLOCK_ASSIGN_OR_RETURN(options.delays, rig::read_delays(arguments.delays, rig));
@@ -171,9 +177,9 @@ void align(const AlignArguments& arguments) {
 
 /// The options that the daemon accepts; the others are in its configuration.
 DaemonAlignment asked_of_daemon(const AlignArguments& arguments, const CLI::App& verb) {
-  static const std::set<std::string> kAskable = {"--tolerance", "--flame-speed", "--detail",
-                                                 "--policy",    "--anyway",      "--renew",
-                                                 "--stop",      "--json",        "--verbose"};
+  static const std::set<std::string> kAskable = {"--tolerance", "--flame-speed", "--detail", "--policy",
+                                                 "--anyway",    "--renew",       "--stop",   "--json",
+                                                 "--verbose",   "--stagger"};
   for (const CLI::Option* option : verb.get_options()) {
     if (option->count() > 0 && !is_daemon_option(*option) && kAskable.count(option->get_name()) == 0) {
       fail({ErrorKind::bad_input, "works only together with --rig", option->get_name(),
@@ -187,13 +193,14 @@ DaemonAlignment asked_of_daemon(const AlignArguments& arguments, const CLI::App&
   if (verb.count("--flame-speed") > 0) wanted.request.set_flame_speed_m_s(arguments.flame_speed);
   if (verb.count("--detail") > 0) wanted.request.set_detail_m(1e-3 * arguments.detail_mm);
   if (verb.count("--policy") > 0) wanted.request.set_policy(arguments.policy);
+  if (arguments.stagger) wanted.request.set_stagger(true);
   wanted.request.set_anyway(arguments.anyway);
   wanted.request.set_renew(wanted.renew_for.has_value());
   wanted.request.set_hold_s(wanted.renew_for.value_or(0));
   return wanted;
 }
 
-/// Adds the options that say how near and for how long.
+/// Adds the options that say to what, how near and for how long.
 void add_tolerance(CLI::App* verb, AlignArguments& a) {
   auto* tolerance = verb->add_option(
       "--tolerance", a.tolerance,
@@ -212,6 +219,10 @@ void add_tolerance(CLI::App* verb, AlignArguments& a) {
           "aligned means: surely for so many seconds, as far as measured drifts and resets can make it")
       ->check(CLI::Range(0.0, 3600.0))
       ->capture_default_str();
+  verb->add_flag("--stagger", a.stagger,
+                 "each camera to its own instant, spread evenly over the frame period: eleven cameras of 24 "
+                 "frames/s then see 264 instants a second (docs/staggered.md). Cameras in the order in which "
+                 "they stand around the flame");
 }
 
 /// Adds the options that limit an alignment.

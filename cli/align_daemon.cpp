@@ -70,7 +70,7 @@ std::string circle_of(const v1::DaemonStatus& status) {
   const bool seen = std::any_of(points.begin(), points.end(), [](const CirclePoint& p) { return !!p.error; });
   if (!seen || alignment.period_s() <= 0 || alignment.row_time_s() <= 0) return {};
   return phase_circle(points, Seconds(alignment.period_s()), Seconds(alignment.tolerance_s()),
-                      SecondsPerRow(alignment.row_time_s()));
+                      SecondsPerRow(alignment.row_time_s()), alignment.staggered());
 }
 
 void print_end(const v1::DaemonStatus& status) {

@@ -2,6 +2,7 @@
 #include "cli/align_rounds.h"
 
 #include <algorithm>
+#include <cmath>
 #include <cstddef>
 #include <utility>
 
@@ -128,6 +129,11 @@ std::string align_summary(const rig::AlignRunResult& result) {
                                                                  : "NOT aligned",
                   last.round, result.resets, name(result.options.policy),
                   words(result.options.tolerance, row), row.value() * 1e6, result.words.reason);
+  if (!result.offsets.empty())
+    text +=
+        fmt::format("  staggered: {} instants a second, {:.3f} ms apart\n",
+                    std::lround(static_cast<double>(result.offsets.size()) / result.options.period.value()),
+                    in_milliseconds(result.options.period / static_cast<double>(result.offsets.size())));
   if (result.checks > 0) text += fmt::format("  held by {} checks\n", result.checks);
   for (std::size_t i = 0; i < result.cameras.size(); ++i)
     text += sensor_line(result.cameras[i], result.row_clocks[i], result.exposures[i]);
@@ -135,7 +141,7 @@ std::string align_summary(const rig::AlignRunResult& result) {
   for (std::size_t i = 0; i < last.cameras.size(); ++i)
     points.push_back({result.cameras[i].id, last.cameras[i].error});
   if (std::any_of(points.begin(), points.end(), [](const CirclePoint& p) { return p.error.has_value(); }))
-    text += phase_circle(points, result.options.period, tolerance * row, row);
+    text += phase_circle(points, result.options.period, tolerance * row, row, !result.offsets.empty());
   return text;
 }
 

@@ -87,13 +87,11 @@ class FramesInTurn {
   }
   [[nodiscard]] OutputRequest request() const { return {out_ / "sequence", kSequence}; }
   [[nodiscard]] std::string label() const {
-    return fmt::format("frame {} ({} of {})", frames_[at_], at_ + 1, frames_.size());
+    return fmt::format("{} {} ({} of {})", arguments_.instants > 1 ? "instant" : "frame", frames_[at_],
+                       at_ + 1, frames_.size());
   }
   [[nodiscard]] ReconstructArguments arguments_of(std::uint64_t frame) const {
-    ReconstructArguments one = arguments_;
-    one.frame = frame;
-    one.out = folder_of(frame).string();
-    return one;
+    return cli::arguments_of(arguments_, frame, folder_of(frame));
   }
 
   [[nodiscard]] bool hopeless() const {
@@ -130,6 +128,7 @@ class FramesInTurn {
     row.loading = written->loading;
     row.writing = written->writing;
     if (written->outcome.report.stopped) return std::optional<Status>();
+    told_.instants = arguments_.instants;
     told_.voxels = written->outcome.report.voxel_choice.voxels;
     keep(row);
     EMBERLOCK_RETURN_IF_ERROR(link(frame));
@@ -151,6 +150,7 @@ class FramesInTurn {
     row.iterations = outcome.report.iterations;
     row.input_rmse = recon::all_channels(outcome.report.input_rmse);
     if (outcome.report.heldout_rmse) row.heldout_rmse = recon::all_channels(*outcome.report.heldout_rmse);
+    row.time = scene.time;
     row.light = recon::light_of(outcome.reconstruction.volume);
     std::vector<Image> renders;
     for (const std::size_t v : looked_at(scene)) renders.push_back(recon::to_rgb8(outcome.renders[v]));
@@ -186,6 +186,8 @@ class FramesInTurn {
     if (std::error_code ec; !fs::exists(path, ec)) return {};
     EMBERLOCK_ASSIGN_OR_RETURN(const std::string text, read_file(path));
     EMBERLOCK_ASSIGN_OR_RETURN(told_, report::parse_sequence(text, path.string()));
+    if (!told_.frames.empty() && told_.instants != arguments_.instants)
+      return another(fmt::format("holds a sequence of {} instants a frame period", told_.instants));
     for (std::size_t i = 0; i < told_.frames.size(); ++i)
       if (i >= frames_.size() || told_.frames[i].frame != frames_[i])
         return another("holds a sequence of other frames");

@@ -63,7 +63,7 @@ std::string offset_line(char letter, const CirclePoint& camera, SecondsPerRow ro
 }  // namespace
 
 std::string phase_circle(const std::vector<CirclePoint>& cameras, Seconds period, Seconds tolerance,
-                         SecondsPerRow row_time) {
+                         SecondsPerRow row_time, bool staggered) {
   CirclePage page;
   constexpr int kSteps = 240;
   for (int i = 0; i < kSteps; ++i) {
@@ -75,7 +75,8 @@ std::string phase_circle(const std::vector<CirclePoint>& cameras, Seconds period
   page.write(kCircleRows / 2 - 1, fmt::format("{:.0f} rows", (period / row_time).value()));
   page.write(kCircleRows / 2, "to a turn");
   page.write(kCircleRows / 2 + 1, fmt::format(":  {:.4g} rows", (tolerance / row_time).value()));
-  std::vector<std::string> legend{"offset from the target, + earlier"};
+  std::vector<std::string> legend{staggered ? "offset from its own instant, + earlier"
+                                            : "offset from the target, + earlier"};
   for (std::size_t i = 0; i < cameras.size(); ++i) {
     if (cameras[i].error) draw_camera(page, -*cameras[i].error / period, letter_of(i));
     legend.push_back(offset_line(letter_of(i), cameras[i], row_time));

@@ -17,7 +17,8 @@ struct CirclePoint {
 
 /// Shutters on the circle that a frame's period is, for a terminal: the target on top, later ones to the
 /// right, the tolerance drawn as ':', cameras as letters with their offsets beside it. At most 100 columns.
+/// The target of staggered cameras is each one's own instant.
 std::string phase_circle(const std::vector<CirclePoint>& cameras, Seconds period, Seconds tolerance,
-                         SecondsPerRow row_time);
+                         SecondsPerRow row_time, bool staggered = false);
 
 }  // namespace emberlock::cli

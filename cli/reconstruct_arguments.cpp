@@ -111,9 +111,20 @@ Result<recon::ReconstructOptions> options_of(const ReconstructArguments& argumen
   return options;
 }
 
+ReconstructArguments arguments_of(const ReconstructArguments& range, std::uint64_t number,
+                                  const std::filesystem::path& out) {
+  ReconstructArguments one = range;
+  const auto instants = static_cast<std::uint64_t>(range.instants);
+  one.frame = number / instants;
+  if (instants > 1) one.part = static_cast<double>(number % instants) / static_cast<double>(instants);
+  one.out = out.string();
+  return one;
+}
+
 Result<recon::SceneOptions> scene_options_of(const ReconstructArguments& arguments) {
   recon::SceneOptions options;
   options.frame = arguments.frame;
+  options.part = arguments.part;
   options.threads = arguments.threads;
   options.recording = arguments.recording;
   if (!arguments.box.empty()) {
@@ -251,6 +262,13 @@ void add_frame_options(CLI::App* verb, ReconstructArguments& a) {
       ->description("A:B: --frame A --last-frame B")
       ->excludes("--frame")
       ->excludes("--last-frame");
+  verb->add_option(
+          "--instants", a.instants,
+          "With --frames, of a session whose cameras are staggered (`emberlock align --stagger`): so "
+          "many volumes a frame period, each view used at its own instant. All numbers but A and B "
+          "count instants then, frame n being n times so many")
+      ->check(CLI::Range(1, 64))
+      ->capture_default_str();
   verb->add_flag("--cold", a.cold, "With --frames: each frame as if it were alone, from darkness");
   verb->add_option("--at-once", a.at_once,
                    "With --frames: so many frames at work, each as if it were alone, "

@@ -38,6 +38,8 @@ struct ReconstructArguments {
   double step = 1;
   std::string voxels;
   std::optional<std::size_t> frame, last_frame;
+  int instants = 1;                    ///< a frame period, of a range; one: the frames
+  std::optional<double> part = {};     ///< as SceneOptions::part
   std::string range = "--last-frame";  ///< the option that told the last one, as it was typed
   bool cold = false;
   int shrink = 1;
@@ -64,6 +66,10 @@ struct ReconstructArguments {
 Result<recon::ReconstructOptions> options_of(const ReconstructArguments& arguments);
 /// What load_views() makes of the options.
 Result<recon::SceneOptions> scene_options_of(const ReconstructArguments& arguments);
+/// Those of one number of a range: frame, and with several instants a frame period the part of it, into
+/// `out`.
+ReconstructArguments arguments_of(const ReconstructArguments& range, std::uint64_t number,
+                                  const std::filesystem::path& out);
 /// The requested views of the requested frame, with their roles.
 Result<recon::Scene> load_views(const ReconstructArguments& arguments, const Progress& progress);
 /// The files that are read; they must not lie in the output folder.

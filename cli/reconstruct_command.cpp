@@ -127,19 +127,23 @@ Status reconstruct_and_tell(const ReconstructArguments& arguments) {
 
 /// The frames from --frame to --last-frame: each from where the one before ended, or each for itself.
 void reconstruct_range(const ReconstructArguments& arguments) {
-  const session::FrameRange range{arguments.frame.value_or(0), *arguments.last_frame, arguments.every};
+  const auto instants = static_cast<std::uint64_t>(arguments.instants);
   const auto session = or_fail(session::SessionReader::open(arguments.input));
   const std::uint64_t recorded = session.camera_count() == 0 ? 0 : session.stamps(0).size();
-  const std::vector<std::uint64_t> frames = or_fail(session::frames_of(range, recorded, arguments.range));
+  // Of what isn't a frame of the recording times so many nothing must overflow.
+  or_fail(session::frames_of({arguments.frame.value_or(0), *arguments.last_frame, recorded + 1}, recorded,
+                             arguments.range));
+  const session::FrameRange range{arguments.frame.value_or(0) * instants, *arguments.last_frame * instants,
+                                  arguments.every};
+  const std::vector<std::uint64_t> frames =
+      or_fail(session::frames_of(range, recorded * instants, arguments.range));
   if (arguments.at_once == 1 && !arguments.cold) return reconstruct_in_turn(arguments, frames);
   const int at_once = std::min(arguments.at_once, static_cast<int>(frames.size()));
   const auto recording = std::make_shared<recon::SharedRecording>();
   const auto reconstruct = [&](std::uint64_t frame, const std::filesystem::path& out,
                                const Progress& progress) {
-    ReconstructArguments one = arguments;
+    ReconstructArguments one = arguments_of(arguments, frame, out);
     one.recording = recording;
-    one.frame = frame;
-    one.out = out.string();
     one.threads = threads_of_each(arguments.threads, at_once);
     return reconstruct_files(one, {progress, Interrupt::asked});
   };
@@ -212,7 +216,7 @@ void add_reconstruct(CLI::App& app) {
     verb->get_option(range)->excludes("--plan")->excludes("--progress-fd");
   verb->callback([arguments, verb, by_daemon, &app] {
     arguments->certificate.program = app.version();
-    for (const char* option : {"--every", "--cold", "--at-once"})
+    for (const char* option : {"--every", "--cold", "--at-once", "--instants"})
       if (verb->count(option) > 0 && !arguments->last_frame)
         throw CLI::RequiresError(option, "--frames or --last-frame");
     if (by_daemon->count() == 0) return reconstruct_command(*arguments);

@@ -8,6 +8,7 @@
 
 #include "base/clock.h"
 #include "cli/certificate_options.h"
+#include "recon/effects/motion.h"
 #include "recon/export/temperature_look_up.h"
 #include "recon/pipeline/coverage.h"
 #include "recon/pipeline/grid_choice.h"
@@ -52,6 +53,8 @@ Result<Written> reconstruct_files(const ReconstructArguments& arguments, const W
   }
   EMBERLOCK_ASSIGN_OR_RETURN(recon::Outcome outcome,
                              solve(scene, options, clock, watchers.progress, preview));
+  if (arguments.part)
+    EMBERLOCK_RETURN_IF_ERROR(recon::check_carried(scene, outcome.reconstruction.effects.motion));
   outcome.report.input = arguments.input;
   outcome.report.up = report::shown_axes(scene.views).up_axis();
   const TimePoint done = clock.now();

@@ -33,6 +33,7 @@ struct SimulateArguments {
   std::string response;
   std::optional<double> exposure_ms;
   double offsets_ms = 0;
+  bool stagger = false;
   std::string sun;
   std::optional<double> albedo;
   double rate = 24;
@@ -91,6 +92,7 @@ void simulate(SimulateArguments arguments) {
   options.rate = Hertz(arguments.rate);
   options.format = pixel_formats().at(arguments.format);
   options.offsets = milliseconds(arguments.offsets_ms);
+  options.stagger = arguments.stagger;
   options.sun = or_fail(parse_sun(arguments));
   if (arguments.exposure_ms) options.exposure = milliseconds(*arguments.exposure_ms);
   if (!arguments.response.empty())
@@ -138,6 +140,10 @@ void add_camera_options(CLI::App& verb, SimulateArguments& a) {
                   "levels]");
   verb.add_option("--offsets", a.offsets_ms, "Milliseconds by which cameras' shutters are late at most")
       ->capture_default_str();
+  verb.add_flag(
+          "--stagger", a.stagger,
+          "Cameras at instants spread evenly over the frame period, as `emberlock align --stagger` has them")
+      ->excludes("--offsets");
   verb.add_option("--sun", a.sun, "x,y,z: of smoke, where the sun stands (default: 1,-1,1)");
   verb.add_option(
       "--albedo", a.albedo,

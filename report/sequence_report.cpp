@@ -40,7 +40,8 @@ Json json_of(const SequenceFrame& f) {
           {"psnr", number(f.psnr)},
           {"ssim", number(f.ssim)},
           {"light", f.light},
-          {"flicker", flicker}};
+          {"flicker", flicker},
+          {"time_s", number(f.time ? std::optional(f.time->value()) : std::nullopt)}};
 }
 
 SequenceFrame frame_of(const Json& json) {
@@ -61,6 +62,9 @@ SequenceFrame frame_of(const Json& json) {
   f.light = json.at("light").get<double>();
   if (const Json& flicker = json.at("flicker"); !flicker.is_null())
     f.flicker = recon::Flicker{flicker.at("pictures").get<double>(), flicker.at("renders").get<double>()};
+  // Earlier versions didn't tell.
+  if (const Json time = json.value("time_s", Json(nullptr)); !time.is_null())
+    f.time = Seconds(time.get<double>());
   return f;
 }
 
@@ -105,11 +109,9 @@ std::string field(const std::optional<double>& value) { return value ? fmt::form
 std::string sequence_json(const SequenceTold& told) {
   Json frames = Json::array();
   for (const SequenceFrame& f : told.frames) frames.push_back(json_of(f));
-  const Json json = {{"format", "emberlock sequence"},
-                     {"version", 1},
-                     {"voxels", told.voxels},
-                     {"held_out", told.held_out},
-                     {"frames", frames}};
+  const Json json = {{"format", "emberlock sequence"}, {"version", 1},
+                     {"voxels", told.voxels},          {"held_out", told.held_out},
+                     {"instants", told.instants},      {"frames", frames}};
   return json.dump(1, ' ', false, Json::error_handler_t::replace) + "\n";  // of paths that are no UTF-8
 }
 
@@ -121,6 +123,7 @@ Result<SequenceTold> parse_sequence(std::string_view text, const std::string& wh
   SequenceTold told;
   told.voxels = json.at("voxels").get<int>();
   told.held_out = json.at("held_out").get<bool>();
+  told.instants = json.value("instants", 1);
   for (const Json& frame : json.at("frames")) told.frames.push_back(frame_of(frame));
   return told;
 } catch (const std::exception& e) {
@@ -131,15 +134,17 @@ std::string sequence_csv(const SequenceTold& told) {
   std::string csv =
       "frame,start,iterations,loading_s,reconstruction_s,writing_s,input_rmse,heldout_rmse,psnr_db,ssim,"
       "light,"
-      "flicker_of_pictures,flicker_of_volume\n";
+      "flicker_of_pictures,flicker_of_volume,time_s\n";
   for (const SequenceFrame* f : done(told)) {
     const auto flicker = [&](double recon::Flicker::*of) {
       return f->flicker ? std::optional((*f->flicker).*of) : std::nullopt;
     };
-    csv += fmt::format("{},\"{}\",{},{:.3f},{:.3f},{:.3f},{:.6g},{},{},{},{:.6g},{},{}\n", f->frame, f->start,
-                       f->iterations, f->loading.value(), f->reconstruction.value(), f->writing.value(),
-                       f->input_rmse, field(f->heldout_rmse), field(f->psnr), field(f->ssim), f->light,
-                       field(flicker(&recon::Flicker::pictures)), field(flicker(&recon::Flicker::renders)));
+    csv +=
+        fmt::format("{},\"{}\",{},{:.3f},{:.3f},{:.3f},{:.6g},{},{},{},{:.6g},{},{},{}\n", f->frame, f->start,
+                    f->iterations, f->loading.value(), f->reconstruction.value(), f->writing.value(),
+                    f->input_rmse, field(f->heldout_rmse), field(f->psnr), field(f->ssim), f->light,
+                    field(flicker(&recon::Flicker::pictures)), field(flicker(&recon::Flicker::renders)),
+                    field(f->time ? std::optional(f->time->value()) : std::nullopt));
   }
   return csv;
 }

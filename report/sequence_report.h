@@ -29,19 +29,21 @@ struct SequenceFrame {
   std::optional<double> psnr = {}, ssim = {};
   double light = 0;  ///< the emission's integral over the volume, mean of the channels, grey levels m2
   std::optional<recon::Flicker> flicker = {};  ///< from the frame before
+  std::optional<Seconds> time = {};            ///< after the recording's first frame
 };
 
 /// All frames that were tried, in their order.
 struct SequenceTold {
   int voxels = 0;  ///< of the first frame, and so of all
   bool held_out = false;
+  int instants = 1;  ///< that are counted a frame period: frame n is number n * instants
   std::vector<SequenceFrame> frames = {};
 };
 
-/// frames.json: {"format": "emberlock sequence", "version": 1, "voxels", "held_out", "frames": [{"frame",
-/// "error" (null where there is a volume), "start", "decided", "iterations", "seconds" {loading,
+/// frames.json: {"format": "emberlock sequence", "version": 1, "voxels", "held_out", "instants", "frames":
+/// [{"frame", "error" (null where there is a volume), "start", "decided", "iterations", "seconds" {loading,
 /// reconstruction, writing}, "input_rmse", "heldout_rmse", "psnr", "ssim", "light", "flicker" {pictures,
-/// renders}}]}; null is what isn't known.
+/// renders}, "time_s"}]}; null is what isn't known.
 std::string sequence_json(const SequenceTold& told);
 /// The reverse. `where` is named in errors (bad_input).
 Result<SequenceTold> parse_sequence(std::string_view json, const std::string& where);

@@ -42,8 +42,9 @@ bool tells_flame(const v1::AlignRequest& request) {
   return request.flame_speed_m_s() > 0 || request.detail_m() > 0;
 }
 
-Result<rig::AlignRunOptions> options_of(const v1::AlignRequest& request, const rig::AlignmentConfig& config,
+Result<rig::AlignRunOptions> options_of(const v1::AlignRequest& request, rig::AlignmentConfig config,
                                         const smear::FlameMotion& flame, rig::Rig& rig) {
+  if (request.has_stagger()) config.stagger = request.stagger();
   EMBERLOCK_ASSIGN_OR_RETURN(rig::AlignRunOptions options, rig.align_options(config));
   if (!config.tolerance || tells_flame(request)) options.align.tolerance = smear::tolerance_for(flame);
   if (!request.tolerance().empty()) {

@@ -12,6 +12,7 @@
 #include "rig/recording_rate.h"
 #include "session/files.h"
 #include "session/name.h"
+#include "smear_sync/align/stagger.h"
 
 namespace emberlock::daemon {
 namespace {
@@ -28,6 +29,18 @@ constexpr std::chrono::milliseconds kFinishSlice{4};
 constexpr Seconds kFrameDeadline{3};
 /// A camera so slow that this many of its frames take longer than kNobodyFilms is waited for.
 constexpr double kFramesWaited = 3;
+
+/// Staggered cameras' places in the frame period, known to the tolerance that the lock holds.
+void describe_stagger(const rig::Alignment& alignment, v1::Manifest& manifest) {
+  if (!smear::staggered(alignment.cameras())) return;
+  const smear::AlignOptions& options = alignment.options();
+  for (v1::CameraStream& stream : *manifest.mutable_cameras())
+    for (const smear::AlignCamera& camera : alignment.cameras()) {
+      if (camera.id != stream.camera_id()) continue;
+      stream.set_late_s(camera.offset.value());
+      stream.set_late_sigma_s(options.tolerance.in_time(options.row_time).value());
+    }
+}
 
 }  // namespace
 
@@ -80,6 +93,7 @@ void Conductor::begin_recording() {
   manifest.set_created_utc(utc_now());
   manifest.set_purpose(record_request_.purpose().empty() ? "flame" : record_request_.purpose());
   parts_.geometry.describe(parts_.rig, manifest);
+  if (alignment_ && state_.lock == Lock::held) describe_stagger(*alignment_, manifest);
   RecorderOptions options{parts_.config.recording.writer, parts_.config.recording.queue};
   if (!real_time()) options.queue.when_full = session::WhenFull::wait;
   // Before the disk is asked for anything: it would stand behind what a salvage writes.

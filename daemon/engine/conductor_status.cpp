@@ -228,6 +228,7 @@ void Conductor::describe_alignment(v1::AlignmentStatus& status) const {
   }
   status.set_shortest_take_s(options.shortest_take.value());
   status.set_policy(std::string(name(options.policy)));
+  status.set_staggered(!align_options_.offsets.empty());
   status.set_tolerance_rows(options.tolerance.in_rows(options.row_time).value());
   status.set_tolerance_s(options.tolerance.in_time(options.row_time).value());
   status.set_row_time_s(options.row_time.value());

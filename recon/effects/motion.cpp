@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include <fmt/format.h>
+
 #include "recon/preprocess/flame_mask.h"
 
 namespace emberlock::recon {
@@ -89,6 +91,22 @@ bool moves(const Scene& scene, const Motion& motion) {
     return false;
   return std::any_of(scene.views.begin(), scene.views.end(),
                      [](const View& view) { return view.lateness != Seconds(0); });
+}
+
+Status check_carried(const Scene& scene, const Motion& motion) {
+  if (!moves(scene, motion)) return {};
+  const double most = 0.5 * scene.box.size.maxCoeff();
+  for (const View& view : scene.views) {
+    const double carried = way(view, motion).norm();
+    if (carried <= most) continue;
+    return Error{
+        ErrorKind::refused,
+        fmt::format("is {:.1f} ms from the instant, and the flame moves {:.0f} mm meanwhile, more than "
+                    "half of its box: its picture shows another flame",
+                    in_milliseconds(view.lateness), 1e3 * carried),
+        "view " + view.name, "Film at a higher rate, or reconstruct frames of cameras that film at once"};
+  }
+  return {};
 }
 
 CameraModel camera_at_instant(const View& view, const Motion& motion) {

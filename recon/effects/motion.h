@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include "base/result.h"
 #include "recon/effects/effects.h"
 #include "recon/preprocess/view.h"
 
@@ -13,6 +14,11 @@ namespace emberlock::recon {
 
 /// Whether the motion changes anything: it is on, and some view is late.
 [[nodiscard]] bool moves(const Scene& scene, const Motion& motion);
+
+/// Whether the views' pictures show the flame of the scene's instant at all: error (refused) where the motion
+/// carries a view's flame by more than half of the box's longest edge, as what was in the box then has left
+/// it.
+Status check_carried(const Scene& scene, const Motion& motion);
 
 /// The camera of a late view, moved back to see the flame of the scene's instant.
 CameraModel camera_at_instant(const View& view, const Motion& motion);

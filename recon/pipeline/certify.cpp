@@ -162,7 +162,7 @@ Status tell_session(const fs::path& folder, const SceneOptions& options, FileHas
     EMBERLOCK_ASSIGN_OR_RETURN(const v1::Rig rig, session::read_rig(*options.rig));
     EMBERLOCK_RETURN_IF_ERROR(apply_rig(manifest, rig, options.rig->string()));
   }
-  const auto filmed = filmed_frames(reader, times, options.frame);
+  const auto filmed = filmed_frames(reader, times, options);
   told.set_session_id(manifest.session_id());
   told.set_created_utc(manifest.created_utc());
   told.set_software(manifest.software());

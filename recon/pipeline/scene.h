@@ -27,6 +27,9 @@ struct SceneOptions {
   std::optional<Box> box;  ///< stands before the input's own; without either it is found from the pictures
   std::optional<std::size_t> frame;  ///< of a session: frame of its first camera; else the one nearest to the
                                      ///< middle of which every camera has a complete frame
+  /// Of a session whose cameras are staggered: the scene's instant, so many frame periods after that frame's,
+  /// 0..1. Each view is then the frame of its camera that is nearest in time.
+  std::optional<double> part = {};
   std::optional<std::filesystem::path> rig =
       {};                    ///< of a session: a rig.json that stands before its calibration
   FrameOptions frames = {};  ///< of a session: how its frames become pictures
@@ -41,10 +44,12 @@ struct SceneOptions {
 /// SessionReader; an input that is neither; no box in the input nor in the options, and none to be found; a
 /// rig that doesn't fit, a camera without calibration, more than 64 of them; a camera of the session that has
 /// no complete frame within one frame period of the chosen instant; a camera response that can't be read, or
-/// cameras with different ones.
+/// cameras with different ones; of an instant between frames (`part`) also cameras of different or unknown
+/// rates, that film at one instant, or that have no frame within half a period of it.
 ///
 /// A box is found (find_box()) so that it holds the flame of several instants over a session. Where a
-/// session's times.json says that cameras were late, views bring their lateness, and what each camera shows
+/// session's times.json, or else its manifest, says that cameras were late, views bring their lateness, and
+/// what each camera shows
 /// on average over frames of the whole recording, the same whatever frame is asked for.
 Result<Scene> load_scene(const std::filesystem::path& input, const SceneOptions& options = {});
 

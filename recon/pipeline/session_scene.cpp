@@ -8,6 +8,8 @@
 #include <string>
 #include <utility>
 
+#include <fmt/format.h>
+
 #include "recon/calibrate/rig.h"
 #include "recon/calibrate/transforms.h"
 #include "recon/compute/pool.h"
@@ -81,17 +83,48 @@ std::size_t middle_frame(const session::SessionReader& reader) {
   return middle;
 }
 
-/// How late a frame is. One that stands in for a lost one is late, or early, by whole periods more.
-Seconds lateness_of(const session::SessionReader& reader, std::size_t camera, std::size_t frame,
-                    TimePoint instant, const v1::ShutterTimes::Camera& times) {
+/// A frame of the first camera, and the scene's instant so much after the one that the cameras' frames share.
+struct Instant {
+  TimePoint time;
+  std::size_t frame = 0;
+  Seconds after{0};
+};
+
+/// When a camera's frame is later than the instant that it belongs to, as times.json says, else the manifest.
+struct Late {
+  Seconds by, sigma;
+};
+std::optional<Late> late_of(const session::SessionReader& reader,
+                            const std::optional<v1::ShutterTimes>& times, std::size_t camera,
+                            std::size_t frame) {
+  if (times) {
+    const v1::ShutterTimes::Camera& told = times->cameras(static_cast<int>(camera));
+    return Late{Seconds(told.late_s(static_cast<int>(frame))), Seconds(told.sigma_s())};
+  }
+  const auto& cameras = reader.manifest().cameras();
+  if (std::all_of(cameras.begin(), cameras.end(), [](const auto& stream) { return stream.late_s() == 0; }))
+    return std::nullopt;
+  const v1::CameraStream& stream = cameras[static_cast<int>(camera)];
+  return Late{Seconds(stream.late_s()), Seconds(stream.late_sigma_s())};
+}
+
+/// The same of the scene's instant: of a frame that belongs to another of the first camera's frames by whole
+/// periods more.
+Late late_after(const Instant& instant, const Late& late, const session::SessionReader& reader,
+                std::size_t camera, std::size_t frame) {
   const double rate = reader.manifest().cameras(static_cast<int>(camera)).frame_rate_hz();
-  const Seconds after = reader.stamps(camera)[frame].monotonic_time - instant;
-  const double periods = rate > 0 ? std::round(after.value() * rate) : 0;
-  return Seconds(times.late_s(static_cast<int>(frame)) + (rate > 0 ? periods / rate : 0));
+  const Seconds after = reader.stamps(camera)[frame].monotonic_time - instant.time;
+  const double periods = rate > 0 ? std::round((after - late.by).value() * rate) : 0;
+  return {late.by + Seconds(rate > 0 ? periods / rate : 0) - instant.after, late.sigma};
 }
 
 std::size_t frame_asked_for(const session::SessionReader& reader, std::optional<std::size_t> frame) {
   return frame ? *frame : reader.stamps(0).empty() ? 0 : middle_frame(reader);
+}
+
+Instant instant_of(const session::SessionReader& reader, std::size_t frame, std::optional<double> part) {
+  const double rate = reader.manifest().cameras(0).frame_rate_hz();
+  return {reader.stamps(0)[frame].monotonic_time, frame, Seconds(part && rate > 0 ? *part / rate : 0)};
 }
 
 /// The cameras of a session, of which each can be read by a thread of its own.
@@ -223,10 +256,36 @@ Status add_averages(Recording& recording, SharedRecording& shared, Scene& scene)
   return {};
 }
 
-struct Instant {
-  TimePoint time;
-  std::size_t frame = 0;  ///< of the first camera
-};
+/// Whether the session tells what happened between its frames. Errors (bad_input): rates that aren't known or
+/// differ; cameras of which none films in half of the period or more.
+Status check_between(const session::SessionReader& reader, const std::optional<v1::ShutterTimes>& times,
+                     const Instant& instant) {
+  const auto refuse = [&](std::string what, const std::string& camera, std::string remedy) {
+    return Error{ErrorKind::bad_input, std::move(what), reader.folder().string() + camera, std::move(remedy)};
+  };
+  const double rate = reader.manifest().cameras(0).frame_rate_hz();
+  std::vector<double> places;  // in the frame period, 0..1
+  for (std::size_t i = 0; i < reader.camera_count(); ++i) {
+    const v1::CameraStream& stream = reader.manifest().cameras(static_cast<int>(i));
+    constexpr double kSameRate = 500e-6;
+    if (!(rate > 0) || !(std::abs(stream.frame_rate_hz() / rate - 1) <= kSameRate))
+      return refuse(
+          fmt::format("films at {:g} frames/s, the first camera at {:g}", stream.frame_rate_hz(), rate),
+          ": camera " + stream.camera_id(), "Between frames only cameras of one frame rate are staggered");
+    const std::size_t frame = std::min(instant.frame, std::max<std::size_t>(reader.stamps(i).size(), 1) - 1);
+    const double turns = late_of(reader, times, i, frame).value_or(Late{}).by.value() * rate;
+    places.push_back(turns - std::floor(turns));
+  }
+  std::sort(places.begin(), places.end());
+  double gap = places.front() + 1 - places.back();
+  for (std::size_t i = 1; i < places.size(); ++i) gap = std::max(gap, places[i] - places[i - 1]);
+  constexpr double kMostGap = 0.6;  // two staggered cameras leave 0.5
+  if (gap <= kMostGap) return {};
+  return refuse(fmt::format("no camera films in {:.0f} % of the frame period, so nothing tells what happens "
+                            "between the frames",
+                            100 * gap),
+                "", "Reconstruct frames, or record with cameras that `emberlock align --stagger` aligned");
+}
 
 /// A camera's view of the instant.
 struct Filmed {
@@ -245,17 +304,27 @@ Result<Filmed> view_of(session::SessionReader& reader, std::size_t i, const v1::
   EMBERLOCK_ASSIGN_OR_RETURN(view.camera, camera_model_of(stream.calibration(), size, stream.camera_id(),
                                                           (reader.folder() / "manifest.json").string() +
                                                               ": cameras[" + std::to_string(i) + "]"));
-  const auto nearest = frame_at(reader, i, instant.time);
+  const auto nearest = frame_at(reader, i, instant.time + instant.after);
   if (!nearest) {
     return Error{ErrorKind::bad_input,
                  "has no complete frame within a frame period of frame " + std::to_string(instant.frame),
                  reader.folder().string() + ": camera " + stream.camera_id(),
                  "Choose another --frame; the index tells which frames were lost"};
   }
-  if (times) {
-    const v1::ShutterTimes::Camera& told = times->cameras(static_cast<int>(i));
-    view.lateness = lateness_of(reader, i, *nearest, instant.time, told);
-    view.lateness_sigma = Seconds(told.sigma_s());
+  if (const auto late = late_of(reader, times, i, *nearest)) {
+    const Late after = late_after(instant, *late, reader, i, *nearest);
+    view.lateness = after.by;
+    view.lateness_sigma = after.sigma;
+  }
+  constexpr double kNearEnough = 0.6;  // of a period: stamps choose the frame, and tell their time less well
+  if (options.part && abs(view.lateness).value() * stream.frame_rate_hz() > kNearEnough) {
+    return Error{
+        ErrorKind::bad_input,
+        fmt::format("has no complete frame within half a frame period of {:.2f} periods after frame {}",
+                    *options.part, instant.frame),
+        reader.folder().string() + ": camera " + stream.camera_id(),
+        "An instant between frames needs every camera's frame before or after it: leave out the "
+        "recording's first and last frame, and those beside lost ones"};
   }
   EMBERLOCK_ASSIGN_OR_RETURN(const Frame shown, reader.read(i, *nearest));
   EMBERLOCK_ASSIGN_OR_RETURN(filmed.developer,
@@ -271,19 +340,20 @@ Result<Filmed> view_of(session::SessionReader& reader, std::size_t i, const v1::
 
 std::vector<std::optional<FilmedFrame>> filmed_frames(const session::SessionReader& reader,
                                                       const std::optional<v1::ShutterTimes>& times,
-                                                      std::optional<std::size_t> frame) {
+                                                      const SceneOptions& options) {
   std::vector<std::optional<FilmedFrame>> filmed(reader.camera_count());
-  const std::size_t asked = reader.camera_count() == 0 ? 0 : frame_asked_for(reader, frame);
+  const std::size_t asked = reader.camera_count() == 0 ? 0 : frame_asked_for(reader, options.frame);
   if (filmed.empty() || asked >= reader.stamps(0).size()) return filmed;
-  const TimePoint instant = reader.stamps(0)[asked].monotonic_time;
+  const Instant instant = instant_of(reader, asked, options.part);
   for (std::size_t i = 0; i < filmed.size(); ++i) {
-    const auto nearest = frame_at(reader, i, instant);
+    const auto nearest = frame_at(reader, i, instant.time + instant.after);
     if (!nearest) continue;
     filmed[i] = FilmedFrame{*nearest, std::nullopt, Seconds(0)};
-    if (!times) continue;
-    const v1::ShutterTimes::Camera& told = times->cameras(static_cast<int>(i));
-    filmed[i]->late = lateness_of(reader, i, *nearest, instant, told);
-    filmed[i]->late_sigma = Seconds(told.sigma_s());
+    const auto late = late_of(reader, times, i, *nearest);
+    if (!late) continue;
+    const Late after = late_after(instant, *late, reader, i, *nearest);
+    filmed[i]->late = after.by;
+    filmed[i]->late_sigma = after.sigma;
   }
   return filmed;
 }
@@ -315,7 +385,8 @@ Result<Scene> load_session(const fs::path& folder, const SceneOptions& options) 
         "camera " + manifest.cameras(0).camera_id() + " has " + std::to_string(first.size()) + " frames",
         folder.string() + ": frame " + std::to_string(frame), "Choose a smaller --frame"};
   }
-  const Instant instant{first[frame].monotonic_time, frame};
+  const Instant instant = instant_of(reader, frame, options.part);
+  if (options.part) EMBERLOCK_RETURN_IF_ERROR(check_between(reader, times, instant));
   std::vector<Filmed> cameras(reader.camera_count());
   EMBERLOCK_RETURN_IF_ERROR(each_camera(reader, options.threads, [&](std::size_t i) -> Status {
     EMBERLOCK_ASSIGN_OR_RETURN(
@@ -323,6 +394,7 @@ Result<Scene> load_session(const fs::path& folder, const SceneOptions& options) 
     return {};
   }));
   Scene scene;
+  scene.time = instant.time + instant.after - first.front().monotonic_time;
   EMBERLOCK_ASSIGN_OR_RETURN(scene.response,
                              common_response(manifest, options.rig ? options.rig->string() : manifest_name));
   Recording recording{reader, manifest, options, {}};

@@ -18,13 +18,12 @@ Result<Scene> load_session(const std::filesystem::path& folder, const SceneOptio
 /// A camera's frame that stands for an instant.
 struct FilmedFrame {
   std::size_t frame = 0;        ///< of the camera
-  std::optional<Seconds> late;  ///< later than the instant, where times.json tells
+  std::optional<Seconds> late;  ///< later than the instant, where times.json or the manifest tells
   Seconds late_sigma{0};
 };
-/// Those that load_session() makes a scene of, of each camera; nothing of one that has none. `frame`: of the
-/// first camera, as SceneOptions has it.
+/// Those that load_session() makes a scene of, of each camera; nothing of one that has none.
 std::vector<std::optional<FilmedFrame>> filmed_frames(const session::SessionReader& reader,
                                                       const std::optional<v1::ShutterTimes>& times,
-                                                      std::optional<std::size_t> frame);
+                                                      const SceneOptions& options);
 
 }  // namespace emberlock::recon

@@ -3,6 +3,7 @@
 
 #include <array>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -49,6 +50,7 @@ struct Scene {
   /// They went through their cameras' calibrated responses: another gamma would bend them twice.
   bool linearised = false;
   std::shared_ptr<const CameraResponse> response = {};  ///< of all views; null: not known
+  std::optional<Seconds> time = {};  ///< of a session: its instant, after the first camera's first frame
 };
 
 }  // namespace emberlock::recon

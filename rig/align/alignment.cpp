@@ -12,14 +12,13 @@
 #include "rig/align/decision_proto.h"
 #include "rig/align/dial.h"
 #include "rig/align/row_times.h"
+#include "rig/align/stagger.h"
 #include "smear_sync/align/move_together.h"
 #include "smear_sync/align/reset_delay.h"
+#include "smear_sync/align/stagger.h"
 
 namespace emberlock::rig {
 namespace {
-
-/// Cameras whose nominal rates differ by more can't be held in step by resets.
-constexpr double kSameRate = 500e-6;
 
 /// Looks about the edge that the phase of one global shutter takes in a round, beside one without flashes
 /// that all of them share.
@@ -46,28 +45,25 @@ constexpr double kAhead = 0.05;
 /// Where people press shutters they are filmed at least this often: what a press does is seen at once.
 constexpr Seconds kLongestWaitForPeople{0.25};
 
-Result<Seconds> common_period(const AlignRig& rig, const AlignRunOptions& options) {
+/// That the options go by the rig's cameras, and its strobe shows their phases; the frame period.
+Result<Seconds> check_rig(const AlignRig& rig, const AlignRunOptions& options) {
   const auto refuse = [](std::string what, std::string where, std::string remedy) {
     return Error{ErrorKind::bad_input, std::move(what), std::move(where), std::move(remedy)};
   };
-  if (rig.cameras.empty()) return refuse("there is no camera", "align", "connect at least two");
-  if (options.timing.size() != rig.cameras.size() ||
-      (!options.delays.empty() && options.delays.size() != rig.cameras.size())) {
-    return refuse("timings or delays don't go by camera", "align", "give one for each camera");
+  EMBERLOCK_ASSIGN_OR_RETURN(const Seconds period, common_period(rig.cameras));
+  const auto goes_by_camera = [&](const auto& list) {
+    return list.empty() || list.size() == rig.cameras.size();
+  };
+  if (options.timing.empty() || !goes_by_camera(options.timing) || !goes_by_camera(options.delays) ||
+      !goes_by_camera(options.offsets)) {
+    return refuse("timings, delays or offsets don't go by camera", "align", "give one for each camera");
   }
+  if (!options.offsets.empty())
+    EMBERLOCK_RETURN_IF_ERROR(smear::check_stagger(rig.cameras.size(), period,
+                                                   options.align.tolerance.in_time(options.align.row_time)));
   if (options.align.reference >= rig.cameras.size()) {
     return refuse("the reference is not among the cameras", "align", "choose one of the rig's");
   }
-  const Hertz rate = rig.cameras.front()->info().frame_rate;
-  for (const drivers::Camera* camera : rig.cameras) {
-    const Hertz own = camera->info().frame_rate;
-    if (std::abs(own / rate - 1) > kSameRate) {
-      return refuse("films at " + std::to_string(own.value()) + " frames/s, the first camera at " +
-                        std::to_string(rate.value()),
-                    "camera " + camera->info().id, "set all cameras to one frame rate");
-    }
-  }
-  const Seconds period = emberlock::period(rate);
   const Seconds step = options.align.strobe_step;
   if (!(step >= Seconds(0) && step < period / 4)) {
     return refuse(
@@ -154,7 +150,8 @@ std::vector<smear::AlignCamera> describe(const AlignRig& rig, const AlignRunOpti
   for (std::size_t i = 0; i < rig.cameras.size(); ++i) {
     const drivers::CameraInfo& info = rig.cameras[i]->info();
     cameras.push_back({info.id, info.model, info.reset,
-                       options.delays.empty() ? std::nullopt : options.delays[i], info.trim});
+                       options.delays.empty() ? std::nullopt : options.delays[i], info.trim,
+                       options.offsets.empty() ? Seconds(0) : options.offsets[i]});
   }
   return cameras;
 }
@@ -173,7 +170,7 @@ double part_within(const smear::AlignDecision& decision, const smear::AlignOptio
 Result<std::unique_ptr<Alignment>> Alignment::create(const AlignRig& rig, const AlignRunOptions& options,
                                                      AlignObserver observer, Progress progress,
                                                      StopAsked stop) {
-  EMBERLOCK_ASSIGN_OR_RETURN(const Seconds period, common_period(rig, options));
+  EMBERLOCK_ASSIGN_OR_RETURN(const Seconds period, check_rig(rig, options));
   return std::unique_ptr<Alignment>(new Alignment(rig, for_dial(at_period(options, period)),
                                                   std::move(observer), std::move(progress), std::move(stop)));
 }
@@ -264,6 +261,7 @@ void Alignment::wait(TimePoint until) {
 
 AlignRunResult Alignment::result() const {
   AlignRunResult all = result_;
+  all.offsets = options_.offsets;
   all.resets = state_.resets;
   for (std::size_t i = 0; i < cameras_.size(); ++i) {
     all.cameras.push_back(rig_.cameras[i]->info());
@@ -346,6 +344,11 @@ std::optional<PartsPerMillion> Alignment::drift(std::size_t camera) const {
   return rates[camera] - 0.5 * (*slowest + *fastest);
 }
 
+std::optional<Seconds> Alignment::own_target(std::size_t camera) const {
+  if (!last().target) return std::nullopt;
+  return wrap_positive(*last().target - cameras_[camera].offset, result_.options.period);
+}
+
 void Alignment::look(const Film& film) {
   const Seconds tolerance = result_.options.tolerance.in_time(result_.options.row_time);
   for (std::size_t i = 0; i < sights_.size(); ++i) {
@@ -353,7 +356,7 @@ void Alignment::look(const Film& film) {
       sights_[i] = {};
     } else {
       sights_[i] =
-          sight_of(film.readings[i].back(), sensors_[i], result_.timing[i], result_.last.target, tolerance);
+          sight_of(film.readings[i].back(), sensors_[i], result_.timing[i], own_target(i), tolerance);
     }
   }
 }

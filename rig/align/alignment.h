@@ -92,7 +92,7 @@ class Alignment {
   /// How long round() may wait to come in time: at most until ten minutes after the last one; a quarter of a
   /// second where people press shutters and say nothing. 0 when not aligned.
   [[nodiscard]] Seconds next_check(TimePoint now) const;
-  /// The largest difference between two cameras; absent while phases are missing.
+  /// The largest difference between two cameras' errors; absent while phases are missing.
   [[nodiscard]] std::optional<Seconds> worst_pair(TimePoint now) const;
   /// By how much a camera's frame rate, trimmed as it is, exceeds the middle of all; absent likewise.
   [[nodiscard]] std::optional<PartsPerMillion> drift(std::size_t camera) const;
@@ -102,6 +102,7 @@ class Alignment {
             StopAsked stop);
   Status tell(const AlignRoundReport& seen);
   Status carry_out();
+  [[nodiscard]] std::optional<Seconds> own_target(std::size_t camera) const;
   void look(const Film& film);
   void promise();
 

@@ -125,15 +125,17 @@ ordered_json summary_json(const AlignRunResult& result, std::uint64_t seed) {
   line["next_check_s"] = seconds_json(last.next_check);
   line["offers"] = offers_json(last.offers, row);
   line["policy"] = name(result.options.policy);
+  if (!result.offsets.empty()) line["staggered"] = true;
   line["seed"] = seed;
   for (std::size_t i = 0; i < result.cameras.size(); ++i) {
     const auto& clock = result.row_clocks[i];
     const auto& exposure = result.exposures[i];
-    line["cameras"].push_back(
-        {{"id", result.cameras[i].id},
-         {"sensor", name(result.cameras[i].sensor)},
-         {"t_row_us", clock ? ordered_json(clock->row_time.value() * 1e6) : nullptr},
-         {"exposure_ms", exposure ? ordered_json(in_milliseconds(*exposure)) : nullptr}});
+    ordered_json camera = {{"id", result.cameras[i].id},
+                           {"sensor", name(result.cameras[i].sensor)},
+                           {"t_row_us", clock ? ordered_json(clock->row_time.value() * 1e6) : nullptr},
+                           {"exposure_ms", exposure ? ordered_json(in_milliseconds(*exposure)) : nullptr}};
+    if (!result.offsets.empty()) camera["offset_ms"] = in_milliseconds(result.offsets[i]);
+    line["cameras"].push_back(std::move(camera));
   }
   line["reason"] = result.words.reason;
   return line;

@@ -39,6 +39,8 @@ struct AlignRunOptions {
   std::vector<smear::CcdTiming> timing;
   /// By camera, or empty: what is known of the resets' delay from an earlier run.
   std::vector<std::optional<smear::ResetDelay>> delays;
+  /// By camera, or empty: AlignCamera::offset, from stagger().
+  std::vector<Seconds> offsets;
   bool measure_row_time = true;    ///< of CCDs from a comb, before the first round
   std::optional<Hertz> comb_rate;  ///< flashes a second; if absent about ten a frame
   int comb_frames = 24;            ///< of each camera
@@ -78,6 +80,8 @@ struct AlignRunResult {
   std::vector<std::optional<Seconds>> exposures;           ///< by camera, where flashes tell
   std::vector<std::optional<smear::ResetDelay>>
       delays;  ///< by camera, what is known now: options for the next run
+  std::vector<Seconds>
+      offsets;  ///< of staggered cameras, by camera: from one target to each one's own instant
   int resets = 0;
   int checks = 0;  ///< while it was held
 };

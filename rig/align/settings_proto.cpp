@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "rig/align/settings_proto.h"
 
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <limits>
@@ -117,6 +118,7 @@ void take_camera(const AlignmentSettings::Camera& from, AlignRunOptions& to, Int
   intake.take("cameras.frame_period_s", from.frame_period_s(), timing.frame_period, 0);
   intake.take("cameras.row_time_s", from.row_time_s(), timing.row_time, 0);
   intake.take("cameras.direction", kDirections.first_of(from.direction()), timing.direction);
+  intake.take("cameras.offset_s", from.offset_s(), to.offsets.emplace_back(), 0);
   to.delays.emplace_back();
   if (!from.has_delay()) return;
   smear::ResetDelay& delay = to.delays.back().emplace();
@@ -180,6 +182,7 @@ AlignmentSettings to_proto(const AlignRunOptions& options) {
     camera.set_row_time_s(timing.row_time.value());
     camera.set_direction(
         kDirections.second_of(timing.direction).value_or(AlignmentSettings::READ_DIRECTION_UNSPECIFIED));
+    if (i < options.offsets.size()) camera.set_offset_s(options.offsets[i].value());
     if (i >= options.delays.size() || !options.delays[i]) continue;
     camera.mutable_delay()->set_mean_s(options.delays[i]->mean.value());
     camera.mutable_delay()->set_sigma_s(options.delays[i]->sigma.value());
@@ -203,6 +206,10 @@ Result<AlignRunOptions> align_options(const AlignmentSettings& settings) {
   options.seed = settings.seed();
   if (settings.has_hold_s()) intake.take("hold_s", settings.hold_s(), options.hold.emplace(), 0);
   for (const AlignmentSettings::Camera& camera : settings.cameras()) take_camera(camera, options, intake);
+  // Older recordings, and those of one common instant, have none.
+  if (std::all_of(options.offsets.begin(), options.offsets.end(),
+                  [](Seconds offset) { return offset == Seconds(0); }))
+    options.offsets.clear();
   EMBERLOCK_RETURN_IF_ERROR(intake.status());
   return options;
 }

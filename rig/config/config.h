@@ -89,6 +89,7 @@ struct RigConfig {
 struct AlignmentConfig {
   enum class AtStart { nothing, align };
   AtStart at_start = AtStart::nothing;
+  bool stagger = false;                         ///< each camera at its own instant (rig/align/stagger.h)
   std::optional<smear::Tolerance> tolerance{};  ///< default: as the flame needs it
   smear::FlameMotion flame{};
   /// Except timing, delays and the reference, which come from the rig's cameras, and the tolerance.

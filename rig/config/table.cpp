@@ -12,9 +12,17 @@ std::string print_tolerance(const smear::Tolerance& tolerance) {
   return fmt::format("{:.12g}ms", in_milliseconds(std::get<Seconds>(tolerance.amount)));
 }
 
+/// instants = "staggered"
+Key<DaemonConfig> instants() {
+  using C = DaemonConfig;
+  return choice<C>(
+      "instants", EMBERLOCK_AT(alignment.stagger), {{"common", false}, {"staggered", true}},
+      "\"common\": all cameras film at one instant. \"staggered\": each at its own, spread evenly "
+      "over the frame period, the cameras in the order in which they stand around the flame.");
+}
+
 Section<DaemonConfig> make_alignment_section() {
   using C = DaemonConfig;
-  using AtStart = AlignmentConfig::AtStart;
   const auto parse = [](const std::string& given) -> std::optional<smear::Tolerance> {
     const auto tolerance = smear::parse_tolerance(given);
     return tolerance ? std::optional(*tolerance) : std::nullopt;
@@ -23,8 +31,9 @@ Section<DaemonConfig> make_alignment_section() {
       "alignment",
       "How the shutters are aligned, and how long that may take.",
       {choice<C>("at_start", EMBERLOCK_AT(alignment.at_start),
-                 {{"nothing", AtStart::nothing}, {"align", AtStart::align}},
+                 {{"nothing", AlignmentConfig::AtStart::nothing}, {"align", AlignmentConfig::AtStart::align}},
                  "Whether the daemon begins to align by itself once the cameras film."),
+       instants(),
        number<C>("flame_speed_m_s", EMBERLOCK_AT(alignment.flame.speed), {0.001, 10000},
                  "Speed of what moves fastest in the flame, in metres per second."),
        number<C>("detail_mm", EMBERLOCK_AT(alignment.flame.detail), {0.001, 10000, kMilli},

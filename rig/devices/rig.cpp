@@ -11,6 +11,7 @@
 #include "drivers/strobe_serial/strobe_serial.h"
 #include "drivers/virtual/virtual_clock.h"
 #include "rig/align/record.h"
+#include "rig/align/stagger.h"
 #include "rig/devices/flame_scene.h"
 #include "rig/devices/lazy_devices.h"
 #include "rig/devices/virtual_setup.h"
@@ -270,6 +271,9 @@ Result<AlignRunOptions> Rig::align_options(const AlignmentConfig& config) {
   options.timing = timing();
   options.align.reset_by = smear::ResetBy::anybody;
   if (strobe_ != nullptr) options.align.dial = strobe_->dial();
+  if (config.stagger) {
+    EMBERLOCK_ASSIGN_OR_RETURN(options.offsets, stagger(devices().cameras));
+  }
   if (!config.reference.empty()) {
     const auto named = std::find_if(cameras_.begin(), cameras_.end(), [&](const Member& member) {
       return member.camera->info().id == config.reference;

@@ -21,6 +21,7 @@
 #include "rig/simulate/gas_light.h"
 #include "session/shutter_times.h"
 #include "session/writer.h"
+#include "smear_sync/align/stagger.h"
 
 namespace emberlock::rig {
 namespace {
@@ -79,6 +80,8 @@ Status check_simulate(const SimulateOptions& o) {
   const Seconds frame = period(o.rate);
   if (!(o.offsets >= Seconds(0) && o.offsets <= frame / 2))
     return bad("the offsets", "Take 0 to half a frame period");
+  if (o.stagger && o.offsets > Seconds(0))
+    return bad("the offsets of staggered cameras", "Give offsets, or stagger the cameras");
   if (o.exposure && !(o.response && o.response->absolute))
     return Error{ErrorKind::bad_input, "an exposure changes no picture without a response that has a scale",
                  "simulate flame", "Give --response with levels per W / (sr m2), or leave the exposure out"};
@@ -113,6 +116,7 @@ Stage stage_around(const recon::FlameSimulationOptions& o, int cameras, ImageSiz
 }
 
 std::vector<Seconds> draw_offsets(const SimulateOptions& o) {
+  if (o.stagger) return smear::staggered_offsets(static_cast<std::size_t>(o.cameras), period(o.rate));
   std::vector<Seconds> late(static_cast<std::size_t>(o.cameras));
   for (std::size_t i = 1; i < late.size(); ++i)
     late[i] = o.offsets * random_uniform(o.seed, kOffsetStream, i);
@@ -228,7 +232,7 @@ class Filming {
   }
   Result<SimulatedFilm> finish() {
     EMBERLOCK_RETURN_IF_ERROR(writer_->finish());
-    if (options_.offsets > Seconds(0)) {
+    if (options_.offsets > Seconds(0) || options_.stagger) {
       v1::ShutterTimes times;
       for (std::size_t i = 0; i < late_.size(); ++i) {
         v1::ShutterTimes::Camera& camera = *times.add_cameras();

@@ -27,6 +27,8 @@ struct SimulateOptions {
   double read_noise = 0.7;                 ///< grey levels RMS, 0..50; 0: neither it nor shot noise
   /// By how much cameras after the first are late at most, evenly drawn; at most half a frame period.
   Seconds offsets{0};
+  bool stagger =
+      false;  ///< cameras at instants spread evenly over the frame period (smear_sync/align/stagger.h)
   /// Of the cameras; its levels hold for an exposure of kUsualExposure. Absent: recon::standard_response(),
   /// and the session tells none.
   std::optional<recon::CameraResponse> response;

@@ -14,6 +14,7 @@
 #include "smear_sync/align/align_look.h"
 #include "smear_sync/align/align_trim.h"
 #include "smear_sync/align/reset_delay.h"
+#include "smear_sync/align/stagger.h"
 
 namespace emberlock::smear {
 namespace {
@@ -248,7 +249,9 @@ void decide(AlignState& state, AlignDecision& decision, const std::vector<Drift>
   }
   ask_for_one(state, decision, c);
   ask_for_moves(state, decision, c, looks);
-  if (decision.verdict == AlignVerdict::aligned) look_for_blind(decision, c);
+  // Of staggered cameras some are blind at any delay: as long as drifts are measured they take turns.
+  const bool measures = decision.reason.cause == AlignCause::drift_unknown && staggered(c.cameras);
+  if (decision.verdict == AlignVerdict::aligned || measures) look_for_blind(decision, c);
   decision.reference = nearest(decision, c.options);
   foresee(state, decision, drifts, c);
 }
@@ -268,6 +271,17 @@ AlignRound without_delay(AlignRound round, Seconds period) {
   for (CameraView& camera : round.cameras) {
     if (camera.phase.state == PhaseState::known)
       camera.phase.tau = wrap_positive(camera.phase.tau - round.strobe_phase, period);
+  }
+  return round;
+}
+
+/// The round as it would be if every camera's own instant were the target: its read phase earlier by its
+/// offset, tau later. Nobody else knows of offsets but who is told its own target.
+AlignRound without_offsets(AlignRound round, const std::vector<AlignCamera>& cameras, Seconds period) {
+  for (std::size_t i = 0; i < cameras.size(); ++i) {
+    Phase& phase = round.cameras[i].phase;
+    if (phase.state == PhaseState::known && cameras[i].offset != Seconds(0))
+      phase.tau = wrap_positive(phase.tau + cameras[i].offset, period);
   }
   return round;
 }
@@ -338,8 +352,9 @@ TrackOptions track_options(const AlignOptions& options) {
   return {.period = options.period, .rate_spread = options.rate_spread, .rate_wander = options.rate_wander};
 }
 
-AlignStep align_step(const AlignState& before, const AlignRound& round,
+AlignStep align_step(const AlignState& before, const AlignRound& filmed,
                      const std::vector<AlignCamera>& cameras, const AlignOptions& options) {
+  const AlignRound round = without_offsets(filmed, cameras, options.period);
   if (!options.dial) return step_at(before, round, cameras, options);
   AlignState state = before;
   state.cameras.resize(cameras.size());

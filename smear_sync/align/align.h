@@ -84,6 +84,9 @@ struct AlignCamera {
   std::optional<ResetDelay>
       expected_delay;  ///< known before (from an earlier session, or the model's data); else learnt
   std::optional<FrameRateTrim> trim = {};  ///< where its frame rate can be trimmed
+  /// By how much its read phase shall start after the target, 0..T: of staggered cameras (stagger.h). Its
+  /// errors are those to its own instant.
+  Seconds offset{0};
 };
 
 /// What an operator will spend on an alignment. One that can't be had for it is refused before anything is
@@ -287,11 +290,11 @@ struct AlignDecision {
   int round = 0;  ///< from 1
   AlignVerdict verdict = AlignVerdict::go_on;
   std::optional<Seconds> target;  ///< tau of the target in this round, strobe_phase included; absent while
-                                  ///< phases are missing
+                                  ///< phases are missing. A camera's own is less by its offset
   std::optional<std::size_t> reference;  ///< the camera nearest to the target; of fixed_reference that one
   std::vector<CameraDecision> cameras;
   std::optional<Seconds>
-      worst_pair;  ///< largest difference between two cameras; absent while phases are missing
+      worst_pair;  ///< largest difference between two cameras' errors; absent while phases are missing
   std::optional<Seconds> strobe_phase;  ///< the delay to which the strobe shall be moved, in [0, T): to bring
                                         ///< blind cameras out, or to see that dots move with it; once aligned
                                         ///< by the next check

@@ -10,6 +10,7 @@
 #include "base/one_to_one.h"
 #include "smear_sync/align/align_context.h"
 #include "smear_sync/align/dial_words.h"
+#include "smear_sync/align/stagger.h"
 
 namespace emberlock::smear {
 namespace {
@@ -33,12 +34,15 @@ struct Facts {
     return text;
   }
   [[nodiscard]] double in_rows(Seconds time) const { return (time / options.row_time).value(); }
+  /// To what errors are taken.
+  [[nodiscard]] std::string target() const { return staggered(cameras) ? "its own instant" : "the target"; }
 };
 
 /// "reads 34.2 rows (1.847 ms) before the target"
-std::string standing(Seconds error, SecondsPerRow row_time) {
-  return fmt::format("reads {:.1f} rows ({:.3f} ms) {} the target", std::abs((error / row_time).value()),
-                     std::abs(in_milliseconds(error)), error.value() >= 0 ? "before" : "after");
+std::string standing(const Facts& facts, Seconds error) {
+  return fmt::format("reads {:.1f} rows ({:.3f} ms) {} {}", std::abs(facts.in_rows(error)),
+                     std::abs(in_milliseconds(error)), error.value() >= 0 ? "before" : "after",
+                     facts.target());
 }
 
 /// "1 camera", "3 cameras"
@@ -182,7 +186,7 @@ std::string camera_words(const Facts& facts, std::size_t camera) {
       break;
   }
   if (!decision.error) return {};
-  return standing(*decision.error, facts.options.row_time) + after_standing(facts, camera);
+  return standing(facts, *decision.error) + after_standing(facts, camera);
 }
 
 std::string untellable(const Facts& facts) {
@@ -266,11 +270,12 @@ std::string cause_words(const Facts& facts) {
     case AlignCause::leaving:
       return who + " would leave tolerance before long";
     case AlignCause::within:
-      return "every camera lies within tolerance of the target";
+      return "every camera lies within tolerance of " + facts.target();
     case AlignCause::locked:
-      return "every camera is locked within tolerance of the target";
+      return "every camera is locked within tolerance of " + facts.target();
     case AlignCause::trimming:
-      return "trims bring the cameras to the target";
+      return staggered(facts.cameras) ? "trims bring every camera to its own instant"
+                                      : "trims bring the cameras to the target";
     case AlignCause::waits_for_away:
       return "waits for " + who;
     case AlignCause::looks_again:
@@ -281,8 +286,8 @@ std::string cause_words(const Facts& facts) {
     case AlignCause::unmoved:
       return unmoved(facts);
     case AlignCause::drift_unknown:
-      return "every camera lies within tolerance of the target; films on until it is known how " + who +
-             (why.cameras.size() == 1 ? " drifts" : " drift");
+      return "every camera lies within tolerance of " + facts.target() + "; films on until it is known how " +
+             who + (why.cameras.size() == 1 ? " drifts" : " drift");
     case AlignCause::dial:
       return dial_words(facts.decision, facts.cameras, facts.options);
   }

@@ -38,12 +38,16 @@ struct SmallBench {
     }
   }
 
-  /// The largest true difference of a read phase's start from the middle of them all: half of what two
-  /// cameras differ by.
+  /// The largest true difference of a read phase's start, less its camera's offset, from the middle of them
+  /// all: half of what two cameras differ by.
   [[nodiscard]] Rows true_error(SecondsPerRow row_time) const {
     const Seconds period = rig->truth(0).timing.frame_period;
     std::vector<TimePoint> starts;
-    for (int i = 0; i < rig->size(); ++i) starts.push_back(rig->read_start_after(i, rig->clock().now()));
+    for (int i = 0; i < rig->size(); ++i) {
+      const Seconds offset =
+          options.offsets.empty() ? Seconds(0) : options.offsets[static_cast<std::size_t>(i)];
+      starts.push_back(rig->read_start_after(i, rig->clock().now()) - offset);
+    }
     Seconds worst;
     for (const TimePoint a : starts) {
       for (const TimePoint b : starts) worst = std::max(worst, abs(wrap_symmetric(a - b, period)));

@@ -61,7 +61,7 @@ export function idle(): Wire<DaemonStatus> {
 export function alignment(round: number, change: Wire<AlignmentStatus> = {}): AlignmentStatus {
   return {policy: 'densest', tolerance_rows: kTolerance, tolerance_s: kTolerance * kRowTime, row_time_s: kRowTime, period_s: 1 / 24, round, resets: Math.floor(round / 2),
           checks: 0, verdict: 'GO_ON', reason: '', cost: {resets: 24.2, resets_p95: 41, time_s: 96, time_p95_s: 164}, offers: [], reset_next: '', history: history(round),
-          leaves_first: '', shortest_take_s: 10, flame_speed_m_s: 2, detail_m: 0.004, ...change};
+          leaves_first: '', shortest_take_s: 10, flame_speed_m_s: 2, detail_m: 0.004, staggered: false, ...change};
 }
 
 export function aligning(round: number): Wire<DaemonStatus> {

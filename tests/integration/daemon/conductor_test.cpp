@@ -64,6 +64,38 @@ TEST_F(Daemon, FromColdToLocked) {
   }
 }
 
+TEST_F(Daemon, StaggeredCamerasAreLockedAndTheRecordingTellsTheirPlaces) {
+  SmallDaemon daemon(small_config(temp_.path()));
+  v1::AlignRequest request;
+  request.set_stagger(true);
+  ASSERT_TRUE(daemon.conductor->align(request).ok());
+  ASSERT_TRUE(daemon.reach(v1::LOCKED)) << daemon.conductor->status().reason();
+  const v1::AlignmentStatus lock = daemon.conductor->status().alignment();
+  EXPECT_TRUE(lock.staggered());
+  EXPECT_THAT(lock.reason(), HasSubstr("its own instant"));
+  v1::RecordRequest take;
+  take.set_name("staggered");
+  ASSERT_TRUE(daemon.conductor->record(take).ok());
+  ASSERT_TRUE(daemon.work_until([&] { return daemon.conductor->status().recording().frames() > 8; }));
+  ASSERT_TRUE(daemon.conductor->stop_recording().ok());
+  ASSERT_TRUE(daemon.reach(v1::LOCKED));
+  const auto session = session::SessionReader::open(temp_.path() / "sessions" / "staggered");
+  ASSERT_TRUE(session.ok()) << session.error().message();
+  drivers::VirtualRig& rig = *daemon.rig->virtual_rig();
+  const TimePoint now = rig.clock().now();
+  std::vector<double> places;
+  for (int i = 0; i < 4; ++i) {
+    const v1::CameraStream& stream = session->manifest().cameras(i);
+    EXPECT_EQ(stream.late_sigma_s(), lock.tolerance_s());
+    places.push_back(4 * stream.late_s() / lock.period_s());
+    const double apart = (rig.read_start_after(i, now) - rig.read_start_after(0, now)).value();
+    EXPECT_LE(std::abs(std::remainder(apart - stream.late_s(), lock.period_s())), 2 * lock.tolerance_s());
+  }
+  EXPECT_NEAR(places[0], 0, 1e-9);
+  std::sort(places.begin(), places.end());
+  for (int i = 0; i < 4; ++i) EXPECT_NEAR(places[static_cast<std::size_t>(i)], i, 1e-9);
+}
+
 TEST_F(Daemon, AStrobeThatSomebodySetsByItsDialLocksThemToo) {
   rig::DaemonConfig config = small_config(temp_.path());
   config.rig.strobe.source = rig::StrobeSource::manual;

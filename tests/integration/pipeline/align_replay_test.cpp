@@ -11,6 +11,7 @@
 
 #include "rig/align/json.h"
 #include "rig/align/record.h"
+#include "rig/align/stagger.h"
 #include "session/reader.h"
 #include "tests/support/dial_bench.h"
 #include "tests/support/old_alignment.h"
@@ -101,6 +102,24 @@ TEST_F(AlignReplay, GivesTheSameReadingsAndDecisionsToTheBit) {
   ASSERT_TRUE(recorded.ok()) << recorded.error().message();
   ASSERT_GT(recorded->resets, 0);
 
+  std::vector<std::string> again;
+  std::uint64_t seed = 0;
+  const auto replayed = rig::replay_align(folder_, into(again), {}, &seed);
+  ASSERT_TRUE(replayed.ok()) << replayed.error().message();
+  EXPECT_EQ(live, again);
+  EXPECT_EQ(rig::summary_json(*recorded, bench.options.seed).dump(),
+            rig::summary_json(*replayed, seed).dump());
+}
+
+TEST_F(AlignReplay, GivesTheSameStaggeredRunToTheBit) {
+  SmallBench bench(small_rig(5));
+  bench.options.align.policy = smear::AlignPolicy::timed;
+  bench.options.align.tolerance.amount = milliseconds(1.5);
+  bench.options.offsets = rig::stagger(bench.align.cameras).value();
+  std::vector<std::string> live;
+  const auto recorded = rig::record_align(folder_, bench.align, bench.options, into(live));
+  ASSERT_TRUE(recorded.ok()) << recorded.error().message();
+  EXPECT_EQ(recorded->last.verdict, smear::AlignVerdict::aligned);
   std::vector<std::string> again;
   std::uint64_t seed = 0;
   const auto replayed = rig::replay_align(folder_, into(again), {}, &seed);

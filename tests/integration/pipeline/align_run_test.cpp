@@ -8,6 +8,7 @@
 #include <gtest/gtest.h>
 
 #include "rig/align/run.h"
+#include "rig/align/stagger.h"
 #include "tests/support/aligned.h"
 
 namespace emberlock::cli {
@@ -24,6 +25,14 @@ class EveryPolicy : public testing::TestWithParam<smear::AlignPolicy> {};
 TEST_P(EveryPolicy, BringsVirtualCamerasWithinToleranceInTruth) {
   SmallBench bench(small_rig(7));
   bench.options.align.policy = GetParam();
+  expect_aligned_in_truth(bench);
+}
+
+TEST_P(EveryPolicy, BringsStaggeredVirtualCamerasEachToItsOwnInstantInTruth) {
+  SmallBench bench(small_rig(7, 5));
+  bench.options.align.policy = GetParam();
+  bench.options.align.tolerance.amount = Rows(25);
+  bench.options.offsets = rig::stagger(bench.align.cameras).value();
   expect_aligned_in_truth(bench);
 }
 
@@ -49,6 +58,34 @@ TEST(AlignRun, TrimsBringVirtualCamerasWithinARowInTruth) {
   ASSERT_EQ(result->last.verdict, smear::AlignVerdict::aligned) << result->words.reason;
   EXPECT_LT(bench.true_error(result->options.row_time), Rows(1) + kReadingError);
   ASSERT_TRUE(result->last.next_check);
+}
+
+TEST(AlignRun, TrimsStaggerVirtualCamerasWithinARowInTruth) {
+  SmallBench bench(trimmable_rig(7));
+  bench.options.align.policy = smear::AlignPolicy::trimmed;
+  bench.options.align.tolerance.amount = Rows(1);
+  bench.options.align.trim_time = Seconds(15);
+  bench.options.frames_per_round = 8;
+  bench.options.offsets = rig::stagger(bench.align.cameras).value();
+  const auto result = rig::run_align(bench.align, bench.options);
+  ASSERT_TRUE(result.ok()) << result.error().message();
+  ASSERT_EQ(result->last.verdict, smear::AlignVerdict::aligned) << result->words.reason;
+  EXPECT_LT(bench.true_error(result->options.row_time), Rows(1) + kReadingError);
+}
+
+TEST(AlignRun, StaggeringNeedsSeveralCamerasOfOneRateAndInstantsTheToleranceTellsApart) {
+  SmallBench alone(small_rig(7, 1));
+  EXPECT_THAT(rig::stagger(alone.align.cameras).error().message(), HasSubstr("one camera"));
+  drivers::VirtualRigOptions setup = small_rig(7);
+  SmallBench bench(setup);
+  bench.options.offsets = rig::stagger(bench.align.cameras).value();
+  bench.options.align.tolerance.amount = milliseconds(6);
+  EXPECT_THAT(rig::run_align(bench.align, bench.options).error().message(), HasSubstr("mixes them up"));
+  bench.options.offsets.pop_back();
+  EXPECT_THAT(rig::run_align(bench.align, bench.options).error().message(), HasSubstr("go by camera"));
+  setup.cameras[2].nominal_rate = Hertz(1.001 * setup.cameras[2].nominal_rate.value());
+  SmallBench unequal(setup);
+  EXPECT_THAT(rig::stagger(unequal.align.cameras).error().message(), HasSubstr("one frame rate"));
 }
 
 TEST(AlignRun, WhatTheLimitsDontAllowIsRefusedBeforeAnythingIsReset) {

@@ -5,6 +5,7 @@
 #include <rapidcheck.h>
 
 #include "smear_sync/align/align.h"
+#include "smear_sync/align/stagger.h"
 #include "smear_sync/clocks/phase.h"
 #include "tests/support/properties.h"
 #include "tests/support/shift_register.h"
@@ -125,6 +126,30 @@ TEST(AlignLaws, ACommonShiftOfTheStrobeChangesNoDecision) {
     for (std::size_t i = 0; i < 6; ++i) {
       RC_ASSERT(before.cameras[i].reset == after.cameras[i].reset);
       RC_ASSERT(same(*before.cameras[i].error, *after.cameras[i].error));
+    }
+  });
+}
+
+TEST(AlignLaws, StaggeredCamerasAreAlignedAsOthersThatReadAtOnce) {
+  law("offsets taken out of the phases beforehand change no decision", [] {
+    const AlignRound round = any_round(6);
+    const AlignOptions options = any_options();
+    std::vector<AlignCamera> cameras = rig(6);
+    const std::vector<Seconds> offsets = staggered_offsets(6, options.period);
+    const Seconds turn = any_tau();  // all offsets more: the target less, nothing else
+    AlignRound own = round;
+    for (std::size_t i = 0; i < 6; ++i) {
+      cameras[i].offset = wrap_positive(offsets[i] + turn, options.period);
+      if (own.cameras[i].phase.state == PhaseState::known)
+        own.cameras[i].phase.tau = wrap_positive(own.cameras[i].phase.tau + offsets[i], options.period);
+    }
+    const auto staggered = align_step({}, round, cameras, options).decision;
+    const auto at_once = align_step({}, own, rig(6), options).decision;
+    RC_ASSERT(staggered.verdict == at_once.verdict);
+    for (std::size_t i = 0; i < 6; ++i) {
+      RC_ASSERT(staggered.cameras[i].reset == at_once.cameras[i].reset);
+      RC_ASSERT(staggered.cameras[i].reason == at_once.cameras[i].reason);
+      RC_ASSERT(same(*staggered.cameras[i].error, *at_once.cameras[i].error));
     }
   });
 }

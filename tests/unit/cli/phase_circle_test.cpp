@@ -34,6 +34,9 @@ TEST(PhaseCircle, TheTargetIsOnTopLaterOnesToTheRight) {
   EXPECT_EQ(find('b'), std::pair(std::size_t{38}, std::size_t{10}));
   EXPECT_EQ(find('c'), std::pair(std::size_t{6}, std::size_t{10}));
   const std::string text = phase_circle({{"dark", {}}}, kPeriod, Rows(100) * kRow, kRow);
+  EXPECT_THAT(text, HasSubstr("offset from the target"));
+  EXPECT_THAT(phase_circle({{"dark", {}}}, kPeriod, Rows(100) * kRow, kRow, true),
+              HasSubstr("offset from its own instant"));
   EXPECT_THAT(text, HasSubstr("a dark             not seen"));
   EXPECT_THAT(text, HasSubstr("800 rows"));
 }

@@ -53,6 +53,53 @@ double heldout(const Scene& scene, const Effects& effects) {
 
 Motion rising(double speed) { return {Motion::Carry::uniform, {0, 0, speed}}; }
 
+/// Eleven cameras whose instants are spread over a 24th of a second film a flame that rises at 1 m/s; each
+/// brings the picture that is nearest to this part of the period.
+Scene staggered_scene(double part) {
+  constexpr int kCameras = 11;
+  const Seconds period(1 / 24.0);
+  PaperSceneOptions options = small_film();
+  options.flame.rise_speed = 1;
+  options.cameras = kCameras;
+  options.averaged_frames = 8;
+  options.time = part * period;
+  for (int i = 0; i < kCameras; ++i)
+    options.lateness.push_back(wrap_symmetric(period * (4 * i % kCameras / 11.0 - part), period));
+  return paper_scene(options);
+}
+
+TEST(MotionTest, StaggeredCamerasSeeBetweenTheirInstantsAsWellAsAtThem) {
+  Effects moving = absorbing(PerMeter(32.8));
+  Effects still = moving;
+  moving.motion = rising(1);
+  double at = 0;
+  double between = 0;
+  double unaware = 0;
+  for (const int i : {0, 6}) {
+    at += heldout(staggered_scene(i / 11.0), moving);
+    const Scene scene = staggered_scene((i + 0.5) / 11.0);
+    between += heldout(scene, moving);
+    unaware += heldout(scene, still);
+  }
+  EXPECT_LE(between, 1.2 * at);
+  EXPECT_LT(between, 0.7 * unaware) << "pictures of other instants as if they were of this one";
+}
+
+TEST(MotionTest, APictureOfAFlameThatHasLeftTheBoxIsRefused) {
+  Scene scene;
+  scene.box.size = Eigen::Vector3d(0.1, 0.1, 0.3);
+  for (const double late : {0.0, 0.02, -0.02}) {
+    scene.views.emplace_back().name = "late";
+    scene.views.back().lateness = Seconds(late);
+  }
+  EXPECT_TRUE(check_carried(scene, {}).ok());
+  EXPECT_TRUE(check_carried(scene, rising(7.4)).ok());
+  EXPECT_EQ(check_carried(scene, rising(7.6)).error().kind, ErrorKind::refused);
+  EXPECT_FALSE(check_carried(scene, {Motion::Carry::uniform, {6, 6, 0}}).ok());
+  for (View& view : scene.views) view.lateness = Seconds(0);
+  EXPECT_TRUE(check_carried(scene, rising(100)).ok());
+}
+
 TEST(MotionTest, AMovedCameraSeesTheCarriedPointWhereItsOwnSawItLate) {
   View view;
   view.camera =

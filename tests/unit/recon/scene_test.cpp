@@ -2,6 +2,8 @@
 #include "recon/pipeline/scene.h"
 
 #include <algorithm>
+#include <array>
+#include <cmath>
 #include <filesystem>
 #include <fstream>
 
@@ -174,9 +176,23 @@ class SessionSceneTest : public SceneTest {
 
   [[nodiscard]] fs::path record_long(const v1::Manifest& m) const;
 
+  /// Three cameras a third of the period from one another.
+  [[nodiscard]] static v1::Manifest staggered_manifest() {
+    v1::Manifest m = manifest();
+    for (int i = 1; i < 3; ++i) {
+      m.mutable_cameras(i)->set_late_s(0.01 / 3 * i);
+      m.mutable_cameras(i)->set_late_sigma_s(1e-4);
+    }
+    return m;
+  }
+  [[nodiscard]] fs::path record_staggered(const v1::Manifest& m) const {
+    return record(m, 9, {0, 3333333, 6666667});
+  }
+
   /// The second camera lost frame `lost`. Frame f of every camera is evenly filled with 10 + f of 255 (of
-  /// 4095 in the first: 16.06 times that).
-  [[nodiscard]] fs::path record(const v1::Manifest& m, std::uint64_t lost = 3) const {
+  /// 4095 in the first: 16.06 times that), stamped each 10 ms and so much later.
+  [[nodiscard]] fs::path record(const v1::Manifest& m, std::uint64_t lost = 3,
+                                const std::array<std::int64_t, 3>& later_ns = {0, 1000000, 0}) const {
     fs::path folder = root_ / "session";
     fs::remove_all(folder);
     auto writer = session::SessionWriter::create(folder, m, {.min_free_bytes = 0});
@@ -197,8 +213,7 @@ class SessionSceneTest : public SceneTest {
         }
         Frame frame;
         frame.stamp.frame_id = f;
-        frame.stamp.monotonic_time = {
-            static_cast<std::int64_t>(10000000 * f + 1000000 * (camera == 1 ? 1 : 0))};
+        frame.stamp.monotonic_time = {static_cast<std::int64_t>(10000000 * f) + later_ns[camera]};
         frame.image = image;
         EXPECT_TRUE(writer->write(camera, frame).ok());
       }
@@ -413,6 +428,51 @@ TEST_F(SessionSceneTest, TimesBringLatenessAndAverages) {
   EXPECT_NEAR(scene->views[2].lateness_sigma.value(), 1e-5, 1e-12);
   ASSERT_TRUE(scene->views[2].average);
   EXPECT_NEAR(scene->views[2].average->rgb[0], 8, 0.1) << "of 6, 7, 8, 9 and 10";
+}
+
+TEST_F(SessionSceneTest, StaggeredCamerasBringTheirNearestFrameAndItsLateness) {
+  const fs::path folder = record_staggered(staggered_manifest());
+  const auto frame = load_scene(folder, {.box = {}, .frame = 2});
+  ASSERT_TRUE(frame.ok()) << frame.error().message();
+  const double third = 0.01 / 3;
+  EXPECT_NEAR(frame->views[0].lateness.value(), 0, 1e-12);
+  EXPECT_NEAR(frame->views[1].lateness.value(), third, 1e-9);
+  EXPECT_NEAR(frame->views[2].lateness.value(), -third, 1e-9) << "of frame 1";
+  EXPECT_NEAR(frame->views[2].image->rgb[0], 7, 0.1);
+  EXPECT_EQ(frame->views[2].lateness_sigma, Seconds(1e-4));
+  EXPECT_TRUE(frame->views[2].average);
+  EXPECT_NEAR(frame->time->value(), 0.02, 1e-12);
+  // The instants of a period are all alike but for who films when.
+  for (int k = 0; k < 30; ++k) {
+    const double part = k / 30.0 + 1e-3;
+    const auto between = load_scene(folder, {.box = {}, .frame = 2, .part = part});
+    ASSERT_TRUE(between.ok()) << between.error().message();
+    EXPECT_NEAR(between->time->value(), 0.02 + 0.01 * part, 1e-9);
+    for (int v = 0; v < 3; ++v) {
+      const View& view = between->views[static_cast<std::size_t>(v)];
+      EXPECT_NEAR(view.lateness.value(),
+                  wrap_symmetric(Seconds(third * v - 0.01 * part), Seconds(0.01)).value(), 1e-9);
+      const double filmed = between->time->value() + view.lateness.value();
+      const double frame_then = std::round((filmed - third * v) / 0.01);
+      EXPECT_NEAR(view.image->rgb[0], 6 + frame_then, 0.1) << part << ", view " << v;
+    }
+  }
+}
+
+TEST_F(SessionSceneTest, BetweenFramesOnlyStaggeredCamerasOfOneRateTellAnything) {
+  const auto message = [](const fs::path& folder, std::size_t frame, double part) {
+    return load_scene(folder, {.box = {}, .frame = frame, .part = part}).error().message();
+  };
+  EXPECT_THAT(message(record(manifest()), 2, 0.5), HasSubstr("no camera films in 100 %"));
+  v1::Manifest m = staggered_manifest();
+  m.mutable_cameras(1)->set_frame_rate_hz(90);
+  EXPECT_THAT(message(record_staggered(m), 2, 0.5), HasSubstr("films at 90 frames/s"));
+  m.mutable_cameras(1)->set_frame_rate_hz(0);
+  EXPECT_THAT(message(record_staggered(m), 2, 0.5), HasSubstr("films at 0 frames/s"));
+  const fs::path folder = record_staggered(staggered_manifest());
+  EXPECT_THAT(message(folder, 0, 0), HasSubstr("within half a frame period"));
+  EXPECT_THAT(message(folder, 4, 0.9), HasSubstr("camera cam0: has no complete frame within half"))
+      << message(folder, 4, 0.9);
 }
 
 TEST_F(SessionSceneTest, TimesOfAnotherSessionAreRefused) {

@@ -25,7 +25,8 @@ SequenceTold three_frames() {
                       .heldout_rmse = 5.0625,
                       .psnr = 30,
                       .ssim = 0.9,
-                      .light = 1e-3 / 3};
+                      .light = 1e-3 / 3,
+                      .time = Seconds(5.0 / 3)};
   SequenceFrame second{.frame = 45, .error = "no \"flame\" in <cam 3>"};
   SequenceFrame third = first;
   third.frame = 50;
@@ -34,7 +35,7 @@ SequenceTold three_frames() {
   third.heldout_rmse = 6;
   third.psnr = std::numeric_limits<double>::infinity();
   third.flicker = recon::Flicker{8, 6};
-  return {128, true, {first, second, third}};
+  return {128, true, 1, {first, second, third}};
 }
 
 TEST(SequenceReport, ComesBackFromItsJsonToTheBit) {
@@ -80,7 +81,8 @@ TEST(SequenceReport, ThePageAndTheTableHoldEachFrame) {
   EXPECT_THAT(page, HasSubstr("no &quot;flame&quot; in &lt;cam 3&gt;"));
   EXPECT_THAT(page, HasSubstr("the frame before, carried on"));
   const std::string csv = sequence_csv(three_frames());
-  EXPECT_THAT(csv, HasSubstr("\n40,\"darkness\",12,0.500,4.000,0.500,3.25,5.0625,30,0.9,0.000333333,,\n"));
+  EXPECT_THAT(csv,
+              HasSubstr("\n40,\"darkness\",12,0.500,4.000,0.500,3.25,5.0625,30,0.9,0.000333333,,,1.66667\n"));
   EXPECT_THAT(csv, HasSubstr("\n50,\"the frame before, carried on\",12,"));
   EXPECT_EQ(csv.find("\n45,"), std::string::npos);
 }

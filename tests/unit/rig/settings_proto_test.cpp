@@ -39,6 +39,7 @@ AlignRunOptions unusual() {
                      .direction = smear::ReadDirection::bottom_first},
                     {}};
   options.delays = {std::nullopt, smear::ResetDelay{milliseconds(12.3), milliseconds(0.1)}};
+  options.offsets = {Seconds(0), milliseconds(17)};
   options.measure_row_time = false;
   options.comb_rate = Hertz(301);
   options.comb_frames = 23;
@@ -65,6 +66,7 @@ TEST(SettingsProto, ComeBackAsTheyWereToTheBit) {
   EXPECT_EQ(back->align.dial, unusual().align.dial);
   EXPECT_EQ(back->timing[0].direction, smear::ReadDirection::bottom_first);
   EXPECT_FALSE(back->delays[0]);
+  EXPECT_EQ(back->offsets, unusual().offsets);
   EXPECT_EQ(back->delays[1]->mean, milliseconds(12.3));
   EXPECT_EQ(back->seed, 18446744073709551615u);
   EXPECT_FALSE(align_options(to_proto(AlignRunOptions{}))->hold);
@@ -100,6 +102,7 @@ TEST(SettingsProto, WhatIsMissingOrOutOfRangeIsNamed) {
       {"max_looks", [](Settings& s) { s.clear_max_looks(); }},
       {"strobe_step_s", [](Settings& s) { s.set_strobe_step_s(-1); }},
       {"shortest_take_s", [](Settings& s) { s.set_shortest_take_s(-1); }},
+      {"cameras.offset_s", [](Settings& s) { s.mutable_cameras(0)->set_offset_s(-1); }},
       {"reset_by", [](Settings& s) { s.clear_reset_by(); }},
       {"dial", [](Settings& s) { s.mutable_dial()->clear_step_hz(); }},
       {"comb_rate_hz", [](Settings& s) { s.set_comb_rate_hz(0); }},

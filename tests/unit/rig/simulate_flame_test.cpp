@@ -5,7 +5,9 @@
 #include <cmath>
 #include <filesystem>
 #include <string>
+#include <vector>
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "recon/adjust/choose_effects.h"
@@ -202,6 +204,27 @@ TEST_F(SimulateFlameTest, LateCamerasFilmLaterAndSaySo) {
     EXPECT_GT(scene.views[i].lateness.value(), 0);
     EXPECT_LE(scene.views[i].lateness.value(), 0.02);
     EXPECT_GT(off(scene.views[i], truth(1)), 1);
+  }
+}
+
+TEST_F(SimulateFlameTest, StaggeredCamerasFilmAtInstantsSpreadOverThePeriod) {
+  SimulateOptions o = small();
+  o.frames = 4;
+  o.stagger = true;
+  ASSERT_TRUE(simulate_flame(o, folder_).ok());
+  const double period = 1 / o.rate.value();
+  for (const double part : {0.0, 0.25, 0.5}) {
+    const auto scene = recon::load_scene(folder_ / "session", {.box = {}, .frame = 1, .part = part});
+    ASSERT_TRUE(scene.ok()) << scene.error().message();
+    EXPECT_NEAR(scene->time->value(), (1 + part) * period, 1e-6);
+    std::vector<double> places;
+    for (const recon::View& view : scene->views) {
+      EXPECT_LE(std::abs(view.lateness.value()), period / 2 + 1e-6);
+      const double turns = view.lateness.value() / period + part + 1;
+      places.push_back(3 * (turns - std::floor(turns + 1e-6)));
+    }
+    std::sort(places.begin(), places.end());
+    for (int i = 0; i < 3; ++i) EXPECT_NEAR(places[static_cast<std::size_t>(i)], i, 1e-4);
   }
 }
 

@@ -133,6 +133,15 @@ Status check_manifest(const v1::Manifest& manifest, const std::string& where) {
       return Error{ErrorKind::bad_input, "must be finite and not negative", field + ", field transport_s",
                    "Mend the time"};
     }
+    if (!(camera.late_s() >= 0 && camera.late_s() * camera.frame_rate_hz() < 1 &&
+          std::isfinite(camera.late_s()))) {
+      return Error{ErrorKind::bad_input, "must be within a frame period, not negative",
+                   field + ", field late_s", "Mend the time"};
+    }
+    if (!std::isfinite(camera.late_sigma_s()) || camera.late_sigma_s() < 0) {
+      return Error{ErrorKind::bad_input, "must be finite and not negative", field + ", field late_sigma_s",
+                   "Mend the time"};
+    }
     if (camera.has_calibration()) EMBERLOCK_RETURN_IF_ERROR(check_calibration(camera.calibration(), field));
   }
   if (manifest.has_box()) EMBERLOCK_RETURN_IF_ERROR(check_box(manifest.box(), where));

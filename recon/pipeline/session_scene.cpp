@@ -114,8 +114,9 @@ Late late_after(const Instant& instant, const Late& late, const session::Session
                 std::size_t camera, std::size_t frame) {
   const double rate = reader.manifest().cameras(static_cast<int>(camera)).frame_rate_hz();
   const Seconds after = reader.stamps(camera)[frame].monotonic_time - instant.time;
-  const double periods = rate > 0 ? std::round((after - late.by).value() * rate) : 0;
-  return {late.by + Seconds(rate > 0 ? periods / rate : 0) - instant.after, late.sigma};
+  const Seconds told =
+      rate > 0 ? after - Seconds(std::remainder((after - late.by).value(), 1 / rate)) : late.by;
+  return {told - instant.after, late.sigma};
 }
 
 std::size_t frame_asked_for(const session::SessionReader& reader, std::optional<std::size_t> frame) {
@@ -264,11 +265,12 @@ Status check_between(const session::SessionReader& reader, const std::optional<v
     return Error{ErrorKind::bad_input, std::move(what), reader.folder().string() + camera, std::move(remedy)};
   };
   const double rate = reader.manifest().cameras(0).frame_rate_hz();
-  std::vector<double> places;  // in the frame period, 0..1
+  constexpr double kSlowest = 1e-3;  // frames/s: periods are counted in nanoseconds
+  std::vector<double> places;        // in the frame period, 0..1
   for (std::size_t i = 0; i < reader.camera_count(); ++i) {
     const v1::CameraStream& stream = reader.manifest().cameras(static_cast<int>(i));
     constexpr double kSameRate = 500e-6;
-    if (!(rate > 0) || !(std::abs(stream.frame_rate_hz() / rate - 1) <= kSameRate))
+    if (!(rate >= kSlowest) || !(std::abs(stream.frame_rate_hz() / rate - 1) <= kSameRate))
       return refuse(
           fmt::format("films at {:g} frames/s, the first camera at {:g}", stream.frame_rate_hz(), rate),
           ": camera " + stream.camera_id(), "Between frames only cameras of one frame rate are staggered");

@@ -47,7 +47,7 @@ fs::path segment_of(const fs::path& folder, const v1::CameraStream& camera, std:
     if (frame < segment.first_frame() || frame - segment.first_frame() >= segment.frames()) continue;
     std::error_code ec;
     for (const char* ending : {".mkv", ".nut"})
-      if (const fs::path path = (folder / segment.file()).replace_extension(ending); fs::exists(path, ec))
+      if (fs::path path = (folder / segment.file()).replace_extension(ending); fs::exists(path, ec))
         return path;
   }
   return {};

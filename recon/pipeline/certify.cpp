@@ -89,8 +89,9 @@ void tell_worst_pair(v1::SyncEvidence& sync) {
     }
 }
 
-/// By times.json; else by the last decision of an alignment among the session's events.
-v1::SyncEvidence sync_of(const session::SessionReader& reader,
+/// By times.json; of staggered cameras by the manifest; else by the last decision of an alignment among the
+/// session's events.
+v1::SyncEvidence sync_of(const session::SessionReader& reader, bool by_times,
                          const std::vector<std::optional<FilmedFrame>>& filmed) {
   v1::SyncEvidence sync;
   const v1::Manifest& manifest = reader.manifest();
@@ -100,12 +101,13 @@ v1::SyncEvidence sync_of(const session::SessionReader& reader,
     if (late && std::isfinite(*late)) told.set_late_s(*late);
     if (std::isfinite(sigma)) told.set_sigma_s(sigma);
   };
-  const bool timed = std::any_of(filmed.begin(), filmed.end(), [](const auto& f) { return f && f->late; });
-  if (timed) {
-    sync.set_source("times.json");
+  const bool late = std::any_of(filmed.begin(), filmed.end(), [](const auto& f) { return f && f->late; });
+  if (late) {
+    sync.set_source(by_times ? "times.json" : "manifest.json");
     for (std::size_t i = 0; i < filmed.size(); ++i)
       if (filmed[i] && filmed[i]->late)
         add(static_cast<int>(i), filmed[i]->late->value(), filmed[i]->late_sigma.value());
+    if (!by_times) return sync;  // they are to be apart
   } else {
     const auto& events = reader.events();
     const auto last = std::find_if(events.rbegin(), events.rend(), [&](const v1::Event& event) {
@@ -115,7 +117,8 @@ v1::SyncEvidence sync_of(const session::SessionReader& reader,
     sync.set_source("events.binpb");
     for (int i = 0; i < manifest.cameras_size(); ++i) {
       const v1::DecisionEvent::Camera& seen = last->decision().cameras(i);
-      add(i, seen.has_error_s() ? std::optional(seen.error_s()) : std::nullopt, seen.sigma_s());
+      // Its error is positive when it films earlier.
+      add(i, seen.has_error_s() ? std::optional(-seen.error_s()) : std::nullopt, seen.sigma_s());
     }
   }
   tell_worst_pair(sync);
@@ -173,7 +176,7 @@ Status tell_session(const fs::path& folder, const SceneOptions& options, FileHas
   }
   for (std::size_t i = 0; i < filmed.size(); ++i)
     tell_camera(manifest.cameras(static_cast<int>(i)), filmed[i], *told.add_cameras());
-  *told.mutable_sync() = sync_of(reader, filmed);
+  *told.mutable_sync() = sync_of(reader, times.has_value(), filmed);
   if (hashes == nullptr) return {};
   const std::set<fs::path> files = files_shown(reader, filmed);
   HashesFiles hashed(*hashes, observer, files.size());

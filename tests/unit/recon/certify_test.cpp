@@ -135,7 +135,21 @@ TEST_F(CertifySessionTest, TellsHowWellTheCamerasWereInSyncByTheLastDecisionOfAn
   const v1::SyncEvidence sync = told(&hashes_).session().sync();
   EXPECT_EQ(sync.source(), "events.binpb");
   EXPECT_DOUBLE_EQ(sync.worst_pair_s(), 1e-4);
+  EXPECT_DOUBLE_EQ(sync.cameras(1).late_s(), -1e-4) << "its error is positive where it films earlier";
   EXPECT_FALSE(sync.cameras(2).has_late_s()) << "it wasn't read";
+}
+
+TEST_F(CertifySessionTest, TellsTheInstantsOfStaggeredCamerasByTheManifest) {
+  record();
+  auto manifest = session::read_manifest(session_);
+  ASSERT_TRUE(manifest.ok());
+  for (int i = 0; i < 3; ++i) manifest->mutable_cameras(i)->set_late_s(1e-3 * i);
+  ASSERT_TRUE(session::write_manifest(session_, *manifest).ok());
+  const v1::SyncEvidence sync = told(&hashes_).session().sync();
+  EXPECT_EQ(sync.source(), "manifest.json");
+  ASSERT_EQ(sync.cameras_size(), 3);
+  EXPECT_NEAR(sync.cameras(2).late_s(), 2e-3, 1e-9);
+  EXPECT_FALSE(sync.has_worst_pair_s()) << "they are to be apart";
 }
 
 TEST_F(CertifySessionTest, EndsAsItIsAsked) {

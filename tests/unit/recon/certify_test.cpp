@@ -12,6 +12,7 @@
 
 #include "recon/synthetic/flame.h"
 #include "session/events.h"
+#include "session/files.h"
 #include "session/shutter_times.h"
 #include "tests/support/recording.h"
 #include "tests/support/scene_files.h"

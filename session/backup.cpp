@@ -32,8 +32,6 @@ namespace {
 constexpr const char* kPartialSuffix = ".partial";
 constexpr const char* kReplacedSuffix = ".replaced";
 constexpr std::string_view kRemovedPrefix = ".removed-";
-/// File systems that round times of modification round to 2 s at most (FAT).
-constexpr std::int64_t kTimesAgreeNs = 2'000'000'000;
 
 struct FileFacts {
   std::uint64_t bytes = 0;
@@ -75,8 +73,16 @@ std::int64_t nanoseconds(const timespec& time) {
   return std::int64_t{time.tv_sec} * 1'000'000'000 + time.tv_nsec;
 }
 
-bool times_agree(const FileFacts& a, const FileFacts& b) {
-  return a.bytes == b.bytes && std::abs(nanoseconds(a.modified) - nanoseconds(b.modified)) < kTimesAgreeNs;
+/// By how much the file system of a copy may have rounded its time: whole steps of 2 s (FAT), 10 ms (exFAT),
+/// 100 ns (NTFS).
+std::int64_t rounding_of(std::int64_t copied) {
+  if (copied % 1'000'000'000 == 0) return 2'000'000'000;
+  return copied % 10'000'000 == 0 ? 10'000'000 : 100;
+}
+
+bool times_agree(const FileFacts& file, const FileFacts& copy) {
+  const std::int64_t copied = nanoseconds(copy.modified);
+  return file.bytes == copy.bytes && std::abs(nanoseconds(file.modified) - copied) < rounding_of(copied);
 }
 
 Result<UniqueFd> open_to_read(const fs::path& path) {

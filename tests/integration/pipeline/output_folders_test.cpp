@@ -315,6 +315,7 @@ TEST_F(OutputFolders, TheTablesHoldEveryVerbThatWritesOne) {
       "emberlock devices clips --out",    // needs a camera: tests/vm/ptp
       "emberlock batch --out",            // goes on with what is there: tests/integration/batch
       "emberlock batch submit --out",     // the same
+      "emberlock sessions backup --to",   // puts copies beside what is there: backup_test.cpp
       "emberlock evaluate paper --out"};  // several in it: evaluate_paper_test.cpp
   for (const std::vector<Writer>& writers : {replacing(), founding()}) {
     for (const Writer& writer : writers) {
@@ -337,7 +338,8 @@ TEST_F(OutputFolders, TheTablesHoldEveryVerbThatWritesOne) {
       const bool folder = words.find("older") != std::string::npos || option->check_lname("out");
       const bool reads = option->get_positional() || option->check_lname("strobe") ||
                          option->check_lname("camera") || option->check_lname("mask") ||
-                         option->check_lname("depth") || option->check_lname("rig");
+                         option->check_lname("depth") || option->check_lname("rig") ||
+                         option->check_lname("backups");
       if (folder && !reads) found.insert(path + " " + option->get_name());
     }
   });

@@ -49,7 +49,8 @@ describe('on the picture', () => {
     expect(step.points[0]![0]).toBeCloseTo(320, 0);
     expect(step.points.at(-1)![0]).toBeCloseTo(384, 0);
     expect(step.points.every(([, y]) => Math.abs(y - 240) < 1)).toBe(true);
-    expect(await text(page, '#stylization .word')).toBe('goes on · 1 pass · 1 step · residual 3.41 of 255');
+    const word = 'goes on · 1 pass · 1 step · residual 3.41 of 255';  // it comes by another message than the picture
+    await until(() => text(page, '#stylization .word'), shown => shown === word, word);
     await page.getByRole('button', {name: 'Undo'}).click();
     await seen(page, 0);
     expect(await page.getByRole('button', {name: 'Undo'}).isDisabled()).toBe(true);

@@ -43,8 +43,8 @@ using recon::Ledger;
 
 constexpr const char* kGoesOn = "The same command goes on where it ended, on any number of ranks";
 constexpr std::uint64_t kMostFramesOfBatch = 100'000;
-constexpr const char* kTold = "told";      ///< in the ledger, where the report of all is written
-constexpr const char* kOfSlurm = "slurm";  ///< `batch submit` puts it beside the ledger
+constexpr const char* kMarkOfTelling = "told";  ///< in the ledger, where the report of all is written
+constexpr const char* kOfSlurm = "slurm";       ///< `batch submit` puts it beside the ledger
 
 /// What tells a session from others.
 std::string identity_of(const session::SessionReader& session) {
@@ -169,7 +169,7 @@ class BatchRank {
   /// Chunks that were given up, or hold frames that failed.
   Status try_again_what_failed() {
     std::error_code ec;
-    fs::remove(ledger_->folder() / kTold, ec);
+    fs::remove(ledger_->folder() / kMarkOfTelling, ec);
     EMBERLOCK_ASSIGN_OR_RETURN(const report::BatchTold told, told_of(*ledger_, plan_));
     for (const report::BatchChunk& chunk : told.chunks) {
       if ((!chunk.done || chunk.failed == 0) && !ledger_->given_up(chunk.name)) continue;
@@ -242,7 +242,7 @@ class BatchRank {
   /// Of all that is done one rank tells: the first that lives. Of a run that ended early the first one.
   [[nodiscard]] bool is_mine_to_tell() const {
     if (rank_.number == 0 || !ledger_->settled()) return rank_.number == 0;
-    if (std::error_code ec; fs::exists(ledger_->folder() / kTold, ec)) return false;
+    if (std::error_code ec; fs::exists(ledger_->folder() / kMarkOfTelling, ec)) return false;
     for (const auto& [name, worker] : recon::workers_in(ledger_->folder() / "workers"))
       if (worker.rank < rank_.number && pulse_->life_of(name) == recon::Life::alive) return false;
     return true;
@@ -259,7 +259,7 @@ class BatchRank {
     for (const std::string& words : sequence_words(told.sequence)) say("sequence", words);
     say("look at", (out_ / "sequence" / "report.html").string());
     if (!ledger_->settled()) return {};
-    EMBERLOCK_RETURN_IF_ERROR(write_file_atomically(ledger_->folder() / kTold, ""));
+    EMBERLOCK_RETURN_IF_ERROR(write_file_atomically(ledger_->folder() / kMarkOfTelling, ""));
     ledger_->tidy();
     for (const auto& [name, worker] : recon::workers_in(ledger_->folder() / "workers")) {
       std::error_code ec;

@@ -15,6 +15,7 @@
 #include "base/file.h"
 #include "base/output_folder.h"
 #include "base/unique_fd.h"
+#include "cli/shell_word.h"
 
 namespace emberlock::cli {
 namespace {
@@ -65,13 +66,6 @@ Result<Ran> run_program(const std::vector<std::string>& words) {
   return ran;
 }
 
-/// As one word of the shell's.
-std::string quoted(const std::string& word) {
-  std::string text = "'";
-  for (const char c : word) text += c == '\'' ? "'\\''" : std::string(1, c);
-  return text + "'";
-}
-
 fs::path folder_of(const fs::path& out) { return out / "slurm"; }
 
 }  // namespace
@@ -88,13 +82,13 @@ std::string sbatch_script(const SlurmJob& job, const std::vector<std::string>& w
   if (job.cpus > 0) ask(fmt::format("--cpus-per-task={}", job.cpus));
   if (!job.time.empty()) ask("--time=" + job.time);
   for (const std::string& option : job.further) ask(option);
-  ask("--output=" + quoted((folder_of(out) / "job-%j.txt").string()));
+  ask("--output=" + shell_word((folder_of(out) / "job-%j.txt").string()));
   ask("--open-mode=append");
   ask("--requeue");
   ask("--no-kill");
   ask("--signal=TERM@60");  // before its time is over, so that frames which are done are kept
   script += "exec srun --mpi=none --no-kill --kill-on-bad-exit=0 --wait=0";
-  for (const std::string& word : words) script += " " + quoted(word);
+  for (const std::string& word : words) script += " " + shell_word(word);
   return script + "\n";
 }
 

@@ -10,6 +10,7 @@
 #include "cli/image_size.h"
 #include "cli/interrupt.h"
 #include "cli/outputs.h"
+#include "cli/shell_word.h"
 #include "recon/calibrate/board.h"
 #include "rig/sample/sample.h"
 
@@ -22,18 +23,9 @@ struct SampleArguments {
   std::string image = "480x360";
 };
 
-/// As a shell takes it for one word.
-std::string quoted(const std::string& word) {
-  constexpr const char* kPlain = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789_./-";
-  if (word.find_first_not_of(kPlain) == std::string::npos) return word;
-  std::string text = "'";
-  for (const char c : word) text += c == '\'' ? std::string("'\\''") : std::string(1, c);
-  return text + "'";
-}
-
 /// What there is, and the commands that turn it into a volume.
 void print_next(const rig::Sample& sample, const std::string& path) {
-  const std::string folder = quoted(path);
+  const std::string folder = shell_word(path);
   const std::string strobe = fmt::format("--flash-rate {} --comb {}/comb/camera-0.mp4 --comb-rate {}",
                                          sample.flash_rate.value(), folder, sample.comb_rate.value());
   std::printf("%s",

@@ -9,6 +9,7 @@
 #include "daemon/engine/conductor.h"
 #include "daemon/engine/words.h"
 #include "drivers/replay/record.h"
+#include "rig/align/decision_proto.h"
 #include "rig/recording_rate.h"
 #include "session/files.h"
 #include "session/name.h"
@@ -110,6 +111,12 @@ void Conductor::begin_recording() {
   if (records_strobe() && devices_.strobe != nullptr)
     static_cast<void>(
         recorder_->append(drivers::strobe_event(now, alignment_ ? alignment_->strobe() : strobe_settings_)));
+  if (alignment_ && state_.lock == Lock::held) {
+    v1::Event lock;
+    lock.set_monotonic_ns(now.ns);
+    *lock.mutable_decision() = rig::lock_evidence(*alignment_, now);
+    static_cast<void>(recorder_->append(lock));
+  }
   last_frame_.reset();
   expired_ = false;
   static_cast<void>(happen(RecordingBegun{}));

@@ -321,15 +321,29 @@ Seconds Alignment::next_check(TimePoint now) const {
   return std::max(wait - (now - at_), Seconds(0));
 }
 
+std::vector<CameraError> Alignment::errors(TimePoint now) const {
+  if (!last().worst_pair) return {};
+  const smear::TrackOptions track = smear::track_options(result_.options);
+  std::vector<CameraError> errors;
+  Seconds carried;
+  for (std::size_t i = 0; i < cameras_.size(); ++i) {
+    const smear::PhaseTrack& phase = state_.cameras[i].phase;
+    const smear::Drift drift = phase.at(now, track);
+    const Seconds way = wrap_symmetric(drift.tau - phase.at(at_, track).tau, track.period);
+    errors.push_back({last().cameras[i].error.value_or(Seconds()) + way, drift.tau_sigma});
+    carried = carried + way / static_cast<double>(cameras_.size());
+  }
+  for (CameraError& camera : errors) camera.error = wrap_symmetric(camera.error - carried, track.period);
+  return errors;
+}
+
 std::optional<Seconds> Alignment::worst_pair(TimePoint now) const {
   if (!last().worst_pair) return std::nullopt;
-  const smear::TrackOptions track = smear::track_options(result_.options);
-  std::vector<Seconds> tau;
-  for (const smear::CameraTrack& camera : state_.cameras) tau.push_back(camera.phase.at(now, track).tau);
+  const std::vector<CameraError> all = errors(now);
   Seconds worst;
-  for (std::size_t i = 0; i < tau.size(); ++i) {
+  for (std::size_t i = 0; i < all.size(); ++i) {
     for (std::size_t k = 0; k < i; ++k)
-      worst = std::max(worst, abs(wrap_symmetric(tau[i] - tau[k], track.period)));
+      worst = std::max(worst, abs(wrap_symmetric(all[i].error - all[k].error, result_.options.period)));
   }
   return worst;
 }

@@ -12,6 +12,11 @@
 
 namespace emberlock::rig {
 
+struct CameraError {
+  Seconds error;
+  Seconds sigma;  ///< standard error
+};
+
 /// One alignment, round by round, for a caller that has other things to do between them: start() once, then
 /// round() until last() says aligned, and again whenever next_check() has passed, for as long as the lock is
 /// held. Cameras that would leave tolerance are reset by such a round while all are in it: last().renews, and
@@ -92,7 +97,10 @@ class Alignment {
   /// How long round() may wait to come in time: at most until ten minutes after the last one; a quarter of a
   /// second where people press shutters and say nothing. 0 when not aligned.
   [[nodiscard]] Seconds next_check(TimePoint now) const;
-  /// The largest difference between two cameras' errors; absent while phases are missing.
+  /// Each camera's error, positive when it films earlier: the last round's, and how far its rate has carried
+  /// it since, against the mean of all. Empty while phases are missing.
+  [[nodiscard]] std::vector<CameraError> errors(TimePoint now) const;
+  /// The largest difference between two cameras' errors; absent likewise.
   [[nodiscard]] std::optional<Seconds> worst_pair(TimePoint now) const;
   /// By how much a camera's frame rate, trimmed as it is, exceeds the middle of all; absent likewise.
   [[nodiscard]] std::optional<PartsPerMillion> drift(std::size_t camera) const;

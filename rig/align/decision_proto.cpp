@@ -330,4 +330,17 @@ DecisionEvent to_proto(const AlignRoundReport& report) {
   return event;
 }
 
+DecisionEvent lock_evidence(const Alignment& lock, TimePoint now) {
+  DecisionEvent event;
+  event.set_round(static_cast<std::uint32_t>(lock.last().round));
+  event.set_verdict(number_of(lock.last().verdict));
+  for (const CameraError& camera : lock.errors(now)) {
+    DecisionEvent::Camera& told = *event.add_cameras();
+    told.set_error_s(camera.error.value());
+    told.set_sigma_s(camera.sigma.value());
+  }
+  if (const auto worst = lock.worst_pair(now)) event.set_worst_pair_s(worst->value());
+  return event;
+}
+
 }  // namespace emberlock::rig

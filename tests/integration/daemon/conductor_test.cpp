@@ -214,6 +214,11 @@ TEST_F(Daemon, ALockedRecordingIsWholeAndTheLockIsCheckedAfterIt) {
 
   auto session = session::SessionReader::open(temp_.path() / "sessions" / "take 1");
   ASSERT_TRUE(session.ok()) << session.error().message();
+  const auto told = std::find_if(session->events().begin(), session->events().end(),
+                                 [](const v1::Event& event) { return event.has_decision(); });
+  ASSERT_NE(told, session->events().end()) << "a certificate tells by it how well cameras were in sync";
+  ASSERT_EQ(told->decision().cameras_size(), 4);
+  EXPECT_EQ(told->decision().worst_pair_s(), recording.spread_s());
   for (std::size_t camera = 0; camera < 4; ++camera) {
     const std::vector<FrameStamp>& stamps = session->stamps(camera);
     EXPECT_NEAR(static_cast<double>(stamps.size()), 2 * 23.976, 1);

@@ -7,6 +7,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "rig/align/decision_proto.h"
 #include "tests/support/small_rig.h"
 
 namespace emberlock::rig {
@@ -14,6 +15,7 @@ namespace {
 
 using test::small_rig;
 using test::SmallBench;
+using ::testing::IsEmpty;
 
 /// Four CCDs, two of whose crystals are 50 ppm apart, and their alignment.
 class AlignmentTest : public testing::Test {
@@ -62,6 +64,8 @@ TEST_F(AlignmentTest, NothingIsLockedBeforeItIsAligned) {
   EXPECT_EQ(alignment->time_left(now), Seconds(0));
   EXPECT_EQ(alignment->next_check(now), Seconds(0));
   EXPECT_FALSE(alignment->worst_pair(now));
+  EXPECT_THAT(alignment->errors(now), IsEmpty());
+  EXPECT_EQ(lock_evidence(*alignment, now).cameras_size(), 0);
   EXPECT_FALSE(alignment->drift(0));
 }
 
@@ -75,6 +79,24 @@ TEST_F(AlignmentTest, WhatItForetellsOfAnInstantIsTheTruthOfIt) {
     EXPECT_LT(alignment->next_check(now), alignment->time_left(now)) << "a check comes first";
     bench.align.clock->sleep_until(now + 0.3 * alignment->next_check(now));
   }
+}
+
+TEST_F(AlignmentTest, ARecordingIsToldTheErrorsOfItsBeginning) {
+  align();
+  const TimePoint now = alignment->at() + 0.9 * alignment->next_check(alignment->at());
+  const v1::DecisionEvent told = lock_evidence(*alignment, now);
+  ASSERT_EQ(told.cameras_size(), bench.rig->size());
+  const Seconds period = alignment->options().period;
+  for (int i = 0; i < told.cameras_size(); ++i) {
+    const v1::DecisionEvent::Camera& camera = told.cameras(i);
+    EXPECT_GT(camera.sigma_s(), 0);
+    EXPECT_GE(camera.sigma_s(), lock_evidence(*alignment, alignment->at()).cameras(i).sigma_s());
+    const Seconds later =
+        wrap_symmetric(bench.rig->read_start_after(i, now) - bench.rig->read_start_after(0, now), period);
+    const double apart = camera.error_s() - told.cameras(0).error_s();
+    EXPECT_NEAR(apart, -later.value(), 4 * std::hypot(camera.sigma_s(), told.cameras(0).sigma_s())) << i;
+  }
+  EXPECT_EQ(told.worst_pair_s(), alignment->worst_pair(now)->value());
 }
 
 TEST_F(AlignmentTest, ChecksTellTheDriftOfEveryCamera) {

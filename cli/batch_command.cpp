@@ -56,9 +56,6 @@ void add_batch_options(CLI::App* verb, BatchArguments& b) {
   add_picture_options(verb, a);
   add_quantity_options(verb, a);
   add_certificate_options(verb, a.certificate);
-  verb->add_option("--seed", a.seed, "Seed of the random numbers in the paper's solver")
-      ->check(CLI::NonNegativeNumber)
-      ->capture_default_str();
 }
 
 void check_given(const BatchArguments& b) {

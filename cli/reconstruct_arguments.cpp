@@ -163,6 +163,9 @@ std::vector<std::filesystem::path> inputs_of(const ReconstructArguments& argumen
 void add_solve_options(CLI::App* verb, ReconstructArguments& a) {
   verb->add_option("--solver", a.solver, "default, or paper (equations 10 and 11 of the paper)")
       ->capture_default_str();
+  verb->add_option("--seed", a.seed, "Seed of the random numbers in the paper's solver")
+      ->check(CLI::NonNegativeNumber)
+      ->capture_default_str();
   verb->add_option("--hold-out", a.held_out,
                    "Views, counted from 0, that aren't used; the result is scored on them: i,j,...")
       ->delimiter(',');

@@ -194,9 +194,6 @@ void add_reconstruct(CLI::App& app) {
   add_picture_options(verb, a);
   add_quantity_options(verb, a);
   add_certificate_options(verb, a.certificate);
-  verb->add_option("--seed", a.seed, "Seed of the random numbers in the paper's solver")
-      ->check(CLI::NonNegativeNumber)
-      ->capture_default_str();
   verb->add_option("--progress-fd", a.progress_fd,
                    "For programs: write progress, every iteration and the result to this descriptor "
                    "(emberlock/v1/child.proto), nothing to stdout; end when the parent ends")

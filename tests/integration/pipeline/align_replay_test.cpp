@@ -64,6 +64,24 @@ class AlignReplay : public testing::Test {
     for (const nlohmann::ordered_json& round : rounds) lines.push_back(round.dump());
     return lines;
   }
+  /// Records a run, and replays it. Returns the recorded one.
+  rig::AlignRunResult expect_the_same_again(SmallBench& bench) const {
+    std::vector<std::string> live;
+    const auto recorded = rig::record_align(folder_, bench.align, bench.options, into(live));
+    if (!recorded.ok()) {
+      ADD_FAILURE() << recorded.error().message();
+      return {};
+    }
+    std::vector<std::string> again;
+    std::uint64_t seed = 0;
+    const auto replayed = rig::replay_align(folder_, into(again), {}, &seed);
+    EXPECT_TRUE(replayed.ok()) << replayed.error().message();
+    EXPECT_EQ(live, again);
+    if (replayed.ok())
+      EXPECT_EQ(rig::summary_json(*recorded, bench.options.seed).dump(),
+                rig::summary_json(*replayed, seed).dump());
+    return *recorded;
+  }
   void expect_differs_in_round_1() const {
     const auto replayed = rig::replay_align(folder_);
     ASSERT_FALSE(replayed.ok());
@@ -97,18 +115,7 @@ TEST_F(AlignReplay, GivesTheSameReadingsAndDecisionsToTheBit) {
   SmallBench bench(small_rig(4));
   bench.options.align.policy = smear::AlignPolicy::timed;
   bench.options.align.tolerance.amount = milliseconds(1.5);
-  std::vector<std::string> live;
-  const auto recorded = rig::record_align(folder_, bench.align, bench.options, into(live));
-  ASSERT_TRUE(recorded.ok()) << recorded.error().message();
-  ASSERT_GT(recorded->resets, 0);
-
-  std::vector<std::string> again;
-  std::uint64_t seed = 0;
-  const auto replayed = rig::replay_align(folder_, into(again), {}, &seed);
-  ASSERT_TRUE(replayed.ok()) << replayed.error().message();
-  EXPECT_EQ(live, again);
-  EXPECT_EQ(rig::summary_json(*recorded, bench.options.seed).dump(),
-            rig::summary_json(*replayed, seed).dump());
+  EXPECT_GT(expect_the_same_again(bench).resets, 0);
 }
 
 TEST_F(AlignReplay, GivesTheSameStaggeredRunToTheBit) {
@@ -116,17 +123,7 @@ TEST_F(AlignReplay, GivesTheSameStaggeredRunToTheBit) {
   bench.options.align.policy = smear::AlignPolicy::timed;
   bench.options.align.tolerance.amount = milliseconds(1.5);
   bench.options.offsets = rig::stagger(bench.align.cameras).value();
-  std::vector<std::string> live;
-  const auto recorded = rig::record_align(folder_, bench.align, bench.options, into(live));
-  ASSERT_TRUE(recorded.ok()) << recorded.error().message();
-  EXPECT_EQ(recorded->last.verdict, smear::AlignVerdict::aligned);
-  std::vector<std::string> again;
-  std::uint64_t seed = 0;
-  const auto replayed = rig::replay_align(folder_, into(again), {}, &seed);
-  ASSERT_TRUE(replayed.ok()) << replayed.error().message();
-  EXPECT_EQ(live, again);
-  EXPECT_EQ(rig::summary_json(*recorded, bench.options.seed).dump(),
-            rig::summary_json(*replayed, seed).dump());
+  EXPECT_EQ(expect_the_same_again(bench).last.verdict, smear::AlignVerdict::aligned);
 }
 
 TEST_F(AlignReplay, RecordingsWhoseSettingsAndDecisionsAreJsonReplayWhateverTheirSentences) {

@@ -182,21 +182,29 @@ class BatchRank {
 
   Status work_until_settled() {
     while (!Interrupt::asked()) {
-      EMBERLOCK_ASSIGN_OR_RETURN(const auto claim, ledger_->take([&](const std::string& worker) {
-        return pulse_->life_of(worker);
-      }));
+      EMBERLOCK_ASSIGN_OR_RETURN(
+          const auto claim, ledger_->take([&](const std::string& worker) { return pulse_->life_of(worker); },
+                                          static_cast<std::size_t>(rank_.number)));
       if (claim) {
         if (!claim->from.empty())
           say("taken over", fmt::format("frames {}, of {}", claim->chunk, claim->from));
         EMBERLOCK_RETURN_IF_ERROR(work_on(*claim));
       } else if (ledger_->settled()) {
         break;
-      } else {  // somebody works on the last ones, and might die
-        if (progress_) progress_->show();
-        std::this_thread::sleep_for(std::chrono::milliseconds(100));
+      } else {
+        wait_idly();
       }
     }
     return {};
+  }
+
+  /// Somebody works on the last ones, and might die.
+  void wait_idly() {
+    const TimePoint until = clock_.now() + recon::idle_wait(rank_, Seconds(arguments_.patience_s));
+    do {
+      if (progress_) progress_->show();
+      std::this_thread::sleep_for(std::chrono::milliseconds(100));
+    } while (clock_.now() < until && !Interrupt::asked());
   }
 
   Status work_on(const Ledger::Claim& claim) {

@@ -37,7 +37,27 @@ std::size_t sum(const BatchTold& told, std::size_t BatchChunk::*of) {
                          [of](std::size_t total, const BatchChunk& chunk) { return total + chunk.*of; });
 }
 
+std::string duration(Seconds time) {
+  return time < Seconds(100) ? fmt::format("{:.3g} s", time.value()) : fmt::format("{:.0f} s", time.value());
+}
+
+/// Up to as many ranks as there are chunks, beyond which none has anything to do.
+std::string scaling_words(const std::vector<Seconds>& chunks) {
+  constexpr std::size_t kStep = 4;
+  std::string words = "its chunks take " + duration(time_on(1, chunks)) + " on one rank";
+  for (std::size_t ranks = kStep; ranks < chunks.size(); ranks *= kStep)
+    words += fmt::format(", {} on {}", duration(time_on(ranks, chunks)), ranks);
+  return words + fmt::format(", {} on {}; more ranks gain nothing, shorter chunks may",
+                             duration(time_on(chunks.size(), chunks)), chunks.size());
+}
+
 }  // namespace
+
+Seconds time_on(std::size_t ranks, const std::vector<Seconds>& chunks) {
+  std::vector<Seconds> busy_until(std::max<std::size_t>(1, ranks));
+  for (const Seconds chunk : chunks) *std::min_element(busy_until.begin(), busy_until.end()) += chunk;
+  return *std::max_element(busy_until.begin(), busy_until.end());
+}
 
 std::size_t BatchTold::planned() const { return sum(*this, &BatchChunk::planned); }
 std::size_t BatchTold::volumes() const { return sum(*this, &BatchChunk::volumes); }
@@ -57,6 +77,10 @@ std::vector<std::string> batch_words(const BatchTold& told) {
   if (!told.given_up.empty())
     words.push_back(
         fmt::format("given up, as whoever did them died each time: {}", fmt::join(told.given_up, ", ")));
+  std::vector<Seconds> took;
+  for (const BatchChunk& chunk : told.chunks)
+    if (chunk.done) took.push_back(chunk.took);
+  if (took.size() > 1 && took.size() == told.chunks.size()) words.push_back(scaling_words(took));
   return words;
 }
 

@@ -34,7 +34,11 @@ struct BatchTold {
   [[nodiscard]] std::size_t failed() const;
 };
 
-/// What is said of the batch, beside sequence_words().
+/// How long `ranks` like those that did the chunks would take for them, each taking the next one when it is
+/// done; without their start and the report.
+Seconds time_on(std::size_t ranks, const std::vector<Seconds>& chunks);
+
+/// What is said of the batch, beside sequence_words(); of one that is done also what more ranks would buy.
 std::vector<std::string> batch_words(const BatchTold& told);
 /// batch.csv: a line a chunk.
 std::string batch_csv(const BatchTold& told);

@@ -103,8 +103,11 @@ Result<std::optional<std::string>> Ledger::read_plan(const fs::path& folder) {
   return std::optional(std::move(text));
 }
 
-Result<std::optional<Ledger::Claim>> Ledger::take(const LifeOf& life_of) {
-  for (const std::string& chunk : names_in(folder_ / "todo")) {
+Result<std::optional<Ledger::Claim>> Ledger::take(const LifeOf& life_of, std::size_t place) {
+  std::vector<std::string> todo = names_in(folder_ / "todo");
+  if (!todo.empty())
+    std::rotate(todo.begin(), todo.begin() + static_cast<std::ptrdiff_t>(place % todo.size()), todo.end());
+  for (const std::string& chunk : todo) {
     EMBERLOCK_ASSIGN_OR_RETURN(const Moved moved,
                                move_to_own(folder_ / "todo" / chunk, folder_ / "claims" / mine(chunk)));
     if (moved != Moved::yes) continue;

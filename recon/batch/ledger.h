@@ -55,9 +55,10 @@ class Ledger {
     std::filesystem::path work;  ///< the folder to fill; holds what an earlier attempt left that can go on
     std::string from = {};       ///< the worker that it was taken over from
   };
-  /// The first chunk that nobody does, else one whose worker is no longer alive; nothing where there is none.
-  /// Error: io; the chunk is nobody's then.
-  Result<std::optional<Claim>> take(const LifeOf& life_of);
+  /// A chunk that nobody does, else one whose worker is no longer alive; nothing where there is none. The
+  /// `place`-th of the former is asked for first, so that a thousand workers that begin at once needn't all
+  /// ask for the same ones in turn. Error: io; the chunk is nobody's then.
+  Result<std::optional<Claim>> take(const LifeOf& life_of, std::size_t place = 0);
   /// What is in the work's folder becomes the chunk's result; false where another attempt was finished
   /// before, or the folder was taken away from one taken for dead. Error: io.
   Result<bool> finish(const Claim& claim);

@@ -49,6 +49,11 @@ Result<Device> device_of(const Rank& rank, Device asked, bool own_gpus) {
   return gpu ? *gpu : Device(Device::cpu);
 }
 
+Seconds idle_wait(const Rank& rank, Seconds patience) {
+  constexpr Seconds kShortest{0.1}, kOfEachRank{0.02};
+  return std::max(kShortest, std::min(rank.count * kOfEachRank, 0.1 * patience));
+}
+
 int threads_of(const Rank& rank, int cores, int allowed) {
   int threads = std::min(allowed, std::max(1, cores / rank.count_on_machine));
   if (rank.threads > 0) threads = std::min(threads, rank.threads);

@@ -3,6 +3,7 @@
 
 #include <functional>
 
+#include "base/quantity.h"
 #include "recon/compute/device.h"
 
 namespace emberlock::recon {
@@ -24,6 +25,11 @@ Rank rank_from(const std::function<const char*(const char* name)>& environment);
 /// Slurm shows each rank GPUs of its own), those behind the last GPU the CPU. `asked` where it names a
 /// device. Error: that of resolve(), of a device that was named.
 Result<Device> device_of(const Rank& rank, Device asked, bool own_gpus);
+
+/// How long a rank that finds nothing to do waits until it asks again: together they ask fifty times a second
+/// at most, as each time costs the shared folder some hundred requests, and each of them ten times within its
+/// `patience`.
+Seconds idle_wait(const Rank& rank, Seconds patience);
 
 /// CPU threads of a rank: its share of the machine's cores, no more than it may run on (its affinity).
 int threads_of(const Rank& rank, int cores, int allowed);

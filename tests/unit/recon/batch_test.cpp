@@ -108,6 +108,20 @@ TEST(RankTest, IsToldByTheEnvironmentOfWhoStartedIt) {
   EXPECT_EQ(rank_of({{"OMPI_COMM_WORLD_RANK", "no number"}}).number, 0);
 }
 
+TEST(RankTest, IdleRanksAskRarelyEnoughForTheFolderAndOftenEnoughForTheirPatience) {
+  const auto wait = [](int ranks, double patience) {
+    Rank rank;
+    rank.count = ranks;
+    return idle_wait(rank, Seconds(patience)).value();
+  };
+  EXPECT_EQ(wait(1, 60), 0.1);
+  EXPECT_EQ(wait(5, 60), 0.1);
+  EXPECT_DOUBLE_EQ(wait(100, 60), 2);
+  EXPECT_DOUBLE_EQ(wait(1000, 60), 6) << "a dead rank is seen within a tenth more";
+  EXPECT_DOUBLE_EQ(wait(1000, 1000), 20);
+  EXPECT_EQ(wait(1000, 0.5), 0.1);
+}
+
 TEST(RankTest, RanksOfOneMachineShareItsCoresAndKeepToThoseTheyMayRunOn) {
   Rank rank;
   EXPECT_EQ(threads_of(rank, 16, 16), 16);

@@ -217,6 +217,19 @@ TEST_F(LedgerOfTwo, WhatIsGivenBackIsGoneOnWith) {
   EXPECT_TRUE(again->from.empty()) << "nobody died";
 }
 
+TEST_F(LedgerOfTwo, EachBeginsAtItsOwnPlace) {
+  const auto of = [&](std::size_t place) {
+    const auto claim = *first_.take(kAllLive, place);
+    EXPECT_TRUE(first_.give_back(*claim).ok());
+    return claim->chunk;
+  };
+  EXPECT_EQ(of(0), "a");
+  EXPECT_EQ(of(1), "b");
+  EXPECT_EQ(of(7), "b");
+  ASSERT_TRUE((*second_.take(kAllLive, 1)).has_value());
+  EXPECT_EQ(of(1), "a") << "what is left";
+}
+
 TEST_F(LedgerOfTwo, OfOneThatIsGoneEverythingIsKeptAndOfOneThatIsSilentNothing) {
   const auto claim = *first_.take(kAllLive);
   write(*claim, "frame");

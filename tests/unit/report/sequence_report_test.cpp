@@ -1,11 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "report/sequence_report.h"
 
+#include <algorithm>
 #include <limits>
+#include <vector>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "base/random.h"
 #include "report/batch_report.h"
 
 namespace emberlock::report {
@@ -109,6 +112,39 @@ TEST(BatchReport, CountsFramesChunksAndRanks) {
   told.given_up = {"0000065-0000070"};
   EXPECT_THAT(batch_words(told)[1], HasSubstr("n3-17-4"));
   EXPECT_THAT(batch_words(told)[2], HasSubstr("given up"));
+}
+
+TEST(BatchReport, ChunksGoToWhicheverRankIsFree) {
+  const std::vector<Seconds> chunks{Seconds(3), Seconds(1), Seconds(2), Seconds(4), Seconds(2)};
+  EXPECT_EQ(time_on(1, chunks), Seconds(12));
+  EXPECT_EQ(time_on(2, chunks), Seconds(7)) << "3 4 | 1 2 2";
+  EXPECT_EQ(time_on(5, chunks), Seconds(4)) << "the longest";
+  EXPECT_EQ(time_on(1000, chunks), Seconds(4));
+  EXPECT_EQ(time_on(3, {}), Seconds(0));
+  RandomStream random(7, 0);
+  for (int i = 0; i < 200; ++i) {
+    std::vector<Seconds> some(static_cast<std::size_t>(1 + i % 40));
+    for (Seconds& chunk : some) chunk = Seconds(random.uniform());
+    const double all = time_on(1, some).value();
+    const double longest = std::max_element(some.begin(), some.end())->value();
+    for (std::size_t ranks = 1; ranks < 50; ranks += 3) {
+      const double time = time_on(ranks, some).value();
+      const double fair = all / static_cast<double>(ranks);
+      EXPECT_GE(time, std::max(fair, longest) - 1e-9);
+      EXPECT_LE(time, fair + longest + 1e-9) << "nobody is idle before the last chunk is handed out";
+    }
+  }
+}
+
+TEST(BatchReport, OfOneThatIsDoneItSaysWhatMoreRanksWouldBuy) {
+  BatchTold told = two_chunks();
+  told.chunks.resize(2);
+  EXPECT_EQ(batch_words(told).back(),
+            "its chunks take 11 s on one rank, 7 s on 2; more ranks gain nothing, shorter chunks may");
+  for (int i = 0; i < 4; ++i) told.chunks.push_back(told.chunks[1]);
+  EXPECT_THAT(batch_words(told).back(), HasSubstr("27 s on one rank, 8 s on 4, 7 s on 6; more"));
+  told.chunks.resize(1);
+  EXPECT_EQ(batch_words(told).size(), 1U);
 }
 
 TEST(BatchReport, ThePageAndTheTableSayWhoDidWhat) {

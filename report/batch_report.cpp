@@ -37,18 +37,18 @@ std::size_t sum(const BatchTold& told, std::size_t BatchChunk::*of) {
                          [of](std::size_t total, const BatchChunk& chunk) { return total + chunk.*of; });
 }
 
-std::string duration(Seconds time) {
+std::string batch_time(Seconds time) {
   return time < Seconds(100) ? fmt::format("{:.3g} s", time.value()) : fmt::format("{:.0f} s", time.value());
 }
 
 /// Up to as many ranks as there are chunks, beyond which none has anything to do.
 std::string scaling_words(const std::vector<Seconds>& chunks) {
   constexpr std::size_t kStep = 4;
-  std::string words = "its chunks take " + duration(time_on(1, chunks)) + " on one rank";
+  std::string words = "its chunks take " + batch_time(time_on(1, chunks)) + " on one rank";
   for (std::size_t ranks = kStep; ranks < chunks.size(); ranks *= kStep)
-    words += fmt::format(", {} on {}", duration(time_on(ranks, chunks)), ranks);
+    words += fmt::format(", {} on {}", batch_time(time_on(ranks, chunks)), ranks);
   return words + fmt::format(", {} on {}; more ranks gain nothing, shorter chunks may",
-                             duration(time_on(chunks.size(), chunks)), chunks.size());
+                             batch_time(time_on(chunks.size(), chunks)), chunks.size());
 }
 
 }  // namespace

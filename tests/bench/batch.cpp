@@ -2,9 +2,9 @@
 // What a batch costs beside its frames, and what becomes of it on a thousand ranks.
 //   bench_batch ledger [--chunks N] [--folder FOLDER]   threads, as ranks, take and finish empty chunks
 //   bench_batch ranks --first S --next S [--frames N] [--chunk N] [--start S] [--tell S] [--request S]
-// `ranks` needs what was measured: seconds of a chunk's first frame and of each further one (frames.csv), of a
-// rank's start and of the report at the end (the same command again on a batch that is done), and of one request to
-// the shared folder (`ledger`, or the file server's own). It prints a table for the guide.
+// `ranks` needs what was measured: seconds of a chunk's first frame and of each further one (frames.csv), of
+// a rank's start and of the report at the end (the same command again on a batch that is done), and of one
+// request to the shared folder (`ledger`, or the file server's own). It prints a table for the guide.
 #include <algorithm>
 #include <chrono>
 #include <cstdio>
@@ -32,11 +32,13 @@ double clock_seconds() {
 
 recon::Life all_live(const std::string& /*worker*/) { return recon::Life::alive; }
 
-/// Seconds until `ranks` threads have taken and finished all chunks, begun at places of their own or all at the
-/// first.
-double time_of_ledger(const fs::path& folder, const std::vector<std::string>& chunks, int ranks, bool places) {
+/// Seconds until `ranks` threads have taken and finished all chunks, begun at places of their own or all at
+/// the first.
+double time_of_ledger(const fs::path& folder, const std::vector<std::string>& chunks, int ranks,
+                      bool places) {
   fs::remove_all(folder);
-  if (!recon::Ledger::create(folder, "made", "{}", chunks).ok()) throw CLI::RuntimeError("can't write there", 1);
+  if (!recon::Ledger::create(folder, "made", "{}", chunks).ok())
+    throw CLI::RuntimeError("can't write there", 1);
   const double begin = clock_seconds();
   std::vector<std::thread> threads;
   for (int r = 0; r < ranks; ++r)

@@ -18,8 +18,6 @@ namespace fs = std::filesystem;
 
 constexpr const char* kSignature = "worker.json";
 
-std::string folder_of_frame(std::uint64_t frame) { return fmt::format("frame-{}", frame); }
-
 /// `path` leads to `target`, whatever it led to before.
 Status link_to(const fs::path& path, const fs::path& target) {
   std::error_code ec;
@@ -66,14 +64,19 @@ Status sign(const fs::path& chunk, const recon::Worker& worker) {
   return write_file_atomically(chunk / kSignature, to_json(worker));
 }
 
+fs::path volume_in(const fs::path& chunk, std::uint64_t frame) {
+  return chunk / fmt::format("frame-{}", frame) / "volume.vdb";
+}
+
 Status link_volumes(const fs::path& out, const recon::Chunk& chunk) {
   const fs::path done = fs::path("batch") / "done" / chunk.name;
   std::error_code ec;
   for (const std::uint64_t frame : chunk.frames) {
-    const fs::path folder = done / folder_of_frame(frame);
-    if (!fs::exists(out / folder / "volume.vdb", ec)) continue;  // it failed
-    EMBERLOCK_RETURN_IF_ERROR(link_to(out / folder_of_frame(frame), folder));
-    EMBERLOCK_RETURN_IF_ERROR(link_to(out / fmt::format("volume_{:04}.vdb", frame), folder / "volume.vdb"));
+    const fs::path volume = volume_in(done, frame);
+    if (!fs::exists(out / volume, ec)) continue;  // it failed
+    const fs::path folder = volume.parent_path();
+    EMBERLOCK_RETURN_IF_ERROR(link_to(out / folder.filename(), folder));
+    EMBERLOCK_RETURN_IF_ERROR(link_to(out / fmt::format("volume_{:04}.vdb", frame), volume));
   }
   return {};
 }

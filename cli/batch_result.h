@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <filesystem>
 
 #include "base/result.h"
@@ -22,6 +23,8 @@ std::size_t frames_done(const recon::Ledger& ledger, const recon::BatchPlan& pla
 
 /// Who fills a chunk's folder signs it.
 Status sign(const std::filesystem::path& chunk, const recon::Worker& worker);
+/// Where a chunk's folder has this frame's volume.
+std::filesystem::path volume_in(const std::filesystem::path& chunk, std::uint64_t frame);
 /// Links to a done chunk's volumes. Error: io.
 Status link_volumes(const std::filesystem::path& out, const recon::Chunk& chunk);
 

@@ -169,6 +169,7 @@ class BatchRank {
   /// Chunks that were given up, or hold frames that failed.
   Status try_again_what_failed() {
     std::error_code ec;
+    ledger_->forget_losses();
     fs::remove(ledger_->folder() / kMarkOfTelling, ec);
     EMBERLOCK_ASSIGN_OR_RETURN(const report::BatchTold told, told_of(*ledger_, plan_));
     for (const report::BatchChunk& chunk : told.chunks) {
@@ -212,7 +213,8 @@ class BatchRank {
     const Result<bool> whole = reconstruct(claim, chunk);
     if (!whole || !*whole) {
       EMBERLOCK_RETURN_IF_ERROR(ledger_->give_back(claim));
-      return whole || Interrupt::asked() ? Status() : Status(whole.error());
+      // Done by whoever took this rank for dead, who cleared this attempt away: no error of this one.
+      return whole || Interrupt::asked() || ledger_->done(chunk.name) ? Status() : Status(whole.error());
     }
     EMBERLOCK_RETURN_IF_ERROR(ledger_->finish(claim));
     return link_volumes(out_, chunk);
@@ -239,8 +241,11 @@ class BatchRank {
     }
     if (!told) return told.error();
     if (Interrupt::asked() && told->frames.size() < chunk.frames.size()) return false;
-    for (const report::SequenceFrame& frame : told->frames)
+    for (const report::SequenceFrame& frame : told->frames) {
       if (!frame.error.empty()) say("failed", fmt::format("frame {}: {}", frame.frame, frame.error));
+      // Whoever took this rank for dead has taken its first frames away.
+      if (frame.error.empty() && !fs::exists(volume_in(claim.work, frame.frame), ec)) return false;
+    }
     EMBERLOCK_RETURN_IF_ERROR(sign(claim.work, me_));
     return true;
   }

@@ -68,6 +68,13 @@ Result<Ran> run_program(const std::vector<std::string>& words) {
 
 fs::path folder_of(const fs::path& out) { return out / "slurm"; }
 
+/// Where sbatch fills in the job's number, it takes a "%" of the folder's name for more of that.
+std::string pattern_of_output(const fs::path& out) {
+  std::string pattern;
+  for (const char c : folder_of(out).string()) pattern += c == '%' ? std::string("%%") : std::string(1, c);
+  return pattern + "/job-%j.txt";
+}
+
 }  // namespace
 
 std::string sbatch_script(const SlurmJob& job, const std::vector<std::string>& words, const fs::path& out) {
@@ -82,7 +89,7 @@ std::string sbatch_script(const SlurmJob& job, const std::vector<std::string>& w
   if (job.cpus > 0) ask(fmt::format("--cpus-per-task={}", job.cpus));
   if (!job.time.empty()) ask("--time=" + job.time);
   for (const std::string& option : job.further) ask(option);
-  ask("--output=" + shell_word((folder_of(out) / "job-%j.txt").string()));
+  ask("--output=" + shell_word(pattern_of_output(out)));
   ask("--open-mode=append");
   ask("--requeue");
   ask("--no-kill");

@@ -48,6 +48,10 @@ void tell_options(const ReconstructArguments& given, v1::Reconstruction& told) {
   add("lines", given.lines, usual.lines);
   add("errors", given.errors, usual.errors);
   add("seed", given.seed, usual.seed);
+  add("cold", given.cold, usual.cold);
+  if (given.part)
+    add("instants", fmt::format("{}, {:.6f} of a period behind the frame", given.instants, *given.part),
+        std::string());
 }
 
 std::string words_of(const recon::Certification& certification, Seconds time) {

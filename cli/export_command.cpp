@@ -21,6 +21,7 @@
 #include "cli/numbers.h"
 #include "cli/outputs.h"
 #include "cli/result_files.h"
+#include "recon/export/certificate.h"
 #include "recon/export/nanovdb_file.h"
 #include "recon/export/volume_file.h"
 #include "recon/export/vti_file.h"
@@ -136,6 +137,8 @@ Result<float> white_of(const ExportArguments& a, const std::vector<ResultVolume>
   float white = 0;
   bool empty = true;
   const Status read = each_volume(volumes, a.out, bar, 0, kShare, [&](const ResultVolume& from) -> Status {
+    // Before it is read: of a file that was changed its certificate says more than its reader.
+    EMBERLOCK_ASSIGN_OR_RETURN([[maybe_unused]] const auto certified, recon::check_volume(from.file));
     EMBERLOCK_ASSIGN_OR_RETURN(const recon::SharedVolume volume, recon::read_shared_volume(from.file));
     white = std::max(white, recon::brightest(volume));
     for (const recon::SharedGrid& grid : volume.grids)

@@ -45,11 +45,12 @@ Observer watched(const std::string& title) {
   };
 }
 
-/// By the clock of the machine that wrote it last: a camera's may be years off.
+/// By the clock of the machine that wrote it last: a camera's may be years off. Now, where that can't be
+/// read.
 fs::file_time_type last_written(const fs::path& session) {
   std::error_code ec;
   const fs::file_time_type time = fs::last_write_time(session::manifest_path(session), ec);
-  return ec ? fs::file_time_type::max() : time;
+  return ec ? fs::file_time_type::clock::now() : time;
 }
 
 /// Sessions of a folder, those first that nothing has been written to for the longest time.
@@ -57,7 +58,7 @@ std::vector<fs::path> sessions_in_folder(const fs::path& folder) {
   if (!fs::is_directory(folder))
     fail({ErrorKind::bad_input, "no such folder", folder.string(),
           "Name a session, or the folder in which sessions lie"});
-  std::vector<fs::path> found = or_fail(session::SessionStore::open(folder)).finished();
+  std::vector<fs::path> found = session::sessions_in(folder);
   std::map<fs::path, fs::file_time_type> written;
   for (const fs::path& session : found) written[session] = last_written(session);
   std::stable_sort(found.begin(), found.end(),

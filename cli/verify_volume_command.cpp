@@ -19,6 +19,7 @@
 #include "recon/export/certificate.h"
 #include "session/certificate.h"
 #include "session/json_message.h"
+#include "session/text.h"
 
 namespace emberlock::cli {
 namespace {
@@ -30,11 +31,8 @@ struct VerifyVolumeArguments {
   bool json = false;
 };
 
-/// What foreign hands wrote moves no terminal's cursor.
-void line(const char* name, std::string words) {
-  for (char& c : words)
-    if (static_cast<unsigned char>(c) < ' ' || c == 127) c = '?';
-  std::printf("%-16s %s\n", name, words.c_str());
+void line(const char* name, const std::string& words) {
+  std::printf("%-16s %s\n", name, session::printable(words).c_str());
 }
 
 std::string utc(std::int64_t ns) {
@@ -148,6 +146,7 @@ Result<int> check_session(const VerifyVolumeArguments& a, const v1::VolumeCertif
     return !Interrupt::asked();
   };
   const auto& files = first.session().files();
+  if (files.empty()) return session_error("the volume's certificate names none of its files", a.session);
   EMBERLOCK_ASSIGN_OR_RETURN(const std::vector<std::string> problems,
                              session::changed_files(a.session, files, observer));
   if (problems.empty()) return files.size();

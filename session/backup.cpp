@@ -7,6 +7,7 @@
 #include <cstddef>
 #include <cstdio>
 #include <cstdlib>
+#include <iterator>
 #include <map>
 #include <string>
 #include <string_view>
@@ -22,6 +23,7 @@
 #include "base/file.h"
 #include "base/output_folder.h"
 #include "base/unique_fd.h"
+#include "session/events.h"
 #include "session/files.h"
 #include "session/verify.h"
 
@@ -168,22 +170,6 @@ class FileCopier {
   std::string other_ = std::string(kPart, '\0');
 };
 
-/// A finished session that nobody changes while this exists. `operation` is LOCK_SH or LOCK_EX.
-Result<UniqueFd> hold(const fs::path& folder, int operation) {
-  EMBERLOCK_ASSIGN_OR_RETURN(const v1::Manifest manifest, read_manifest(folder));
-  UniqueFd events(::open(events_path(folder).c_str(), O_RDONLY | O_CLOEXEC));
-  if (!events && errno != ENOENT) return errno_error(events_path(folder), "cannot open");
-  const bool writing = events && ::flock(events.get(), operation | LOCK_NB) != 0;
-  if (writing && errno != EWOULDBLOCK) return errno_error(events_path(folder), "cannot lock");
-  if (writing)
-    return Error{ErrorKind::refused, "another process writes it", folder.string(),
-                 "Wait until that has ended"};
-  if (manifest.state() == v1::Manifest::RECORDING)
-    return Error{ErrorKind::refused, "its recording didn't end", folder.string(),
-                 "`emberlock sessions repair` ends it"};
-  return events;
-}
-
 /// "NAME" of "sessions/NAME" and of "sessions/NAME/".
 fs::path named(const fs::path& folder) {
   const fs::path whole = fs::absolute(folder).lexically_normal();
@@ -212,6 +198,12 @@ Status copy_missing(const fs::path& from, const Files& wanted, const fs::path& t
   return sync_folder(to);
 }
 
+/// A copy that a power cut kept from being replaced has its name again.
+void take_back_replaced(const fs::path& copy, const fs::path& replaced) {
+  std::error_code ec;
+  if (!fs::exists(copy, ec) && fs::exists(replaced, ec)) fs::rename(replaced, copy, ec);
+}
+
 /// Gives the complete copy its name; an earlier one goes only then.
 Status put_in_place(const fs::path& partial, const fs::path& copy, const fs::path& replaced) {
   std::error_code ec;
@@ -224,6 +216,74 @@ Status put_in_place(const fs::path& partial, const fs::path& copy, const fs::pat
   EMBERLOCK_RETURN_IF_ERROR(sync_folder(copy.parent_path()));
   fs::remove_all(replaced, ec);
   return {};
+}
+
+std::uint64_t frames_recorded(const v1::Manifest& manifest) {
+  std::uint64_t frames = 0;
+  for (const v1::CameraStream& camera : manifest.cameras()) frames += camera.counts().recorded();
+  return frames;
+}
+
+/// What verify_session() reads.
+bool is_read_back(const std::string& path) {
+  static constexpr std::string_view kEndings[] = {".mkv", ".nut", ".bin", ".binpb", "manifest.json"};
+  return std::any_of(std::begin(kEndings), std::end(kEndings),
+                     [&](std::string_view ending) { return std::string_view(path).ends_with(ending); });
+}
+
+/// Of two files of one time one must be damaged, and nobody knows which.
+Status expect_none_rotted(const fs::path& from, const Files& wanted, const fs::path& copy) {
+  EMBERLOCK_ASSIGN_OR_RETURN(const Files there, files_in(copy));
+  const Observer none;
+  Tally tally(1, none);
+  FileCopier files;
+  for (const auto& [path, facts] : wanted.files) {
+    const auto found = there.files.find(path);
+    if (is_read_back(path) || found == there.files.end() || !times_agree(facts, found->second)) continue;
+    const Status same = files.compare(from / path, copy / path, tally);
+    if (same) continue;
+    if (same.error().kind != ErrorKind::bad_input) return same.error();
+    return Error{ErrorKind::refused,
+                 same.error().what + ", though both were written at one time: one of them is damaged",
+                 same.error().where, "Move the damaged one away"};
+  }
+  return {};
+}
+
+/// A copy that differs from the session stays where it may be the better one, or another session's.
+Status expect_may_replace(const fs::path& from, const Files& wanted, const fs::path& copy,
+                          const Error& difference, const Observer& observer) {
+  EMBERLOCK_ASSIGN_OR_RETURN(const v1::Manifest manifest, read_manifest(from));
+  if (const auto other = read_manifest(copy)) {
+    if (other->session_id() != manifest.session_id() || other->created_utc() != manifest.created_utc())
+      return Error{ErrorKind::refused,
+                   fmt::format("has the name of another session's copy, which was begun {}, this one {}",
+                               other->created_utc(), manifest.created_utc()),
+                   from.string(), "Rename one of them, or name another folder of copies"};
+    if (const auto [here, there] = std::pair(frames_recorded(manifest), frames_recorded(*other));
+        here < there)
+      return Error{ErrorKind::refused, fmt::format("has {} frames, its copy {}", here, there), from.string(),
+                   "Move the copy away if this is the better one, as after a repair"};
+  }
+  EMBERLOCK_RETURN_IF_ERROR(expect_none_rotted(from, wanted, copy));
+  EMBERLOCK_ASSIGN_OR_RETURN(const SessionCheck check, verify_session(from, observer));
+  if (check.readable) return {};
+  return Error{ErrorKind::refused, "is damaged, and its copy is another one: " + difference.message(),
+               from.string(),
+               "`emberlock sessions verify` says of each which is the better one; move the copy away if "
+               "that is this one"};
+}
+
+/// All of it is on the disk, whoever copied it there.
+Status sync_files(const fs::path& folder) {
+  EMBERLOCK_ASSIGN_OR_RETURN(const Files files, files_in(folder));
+  for (const auto& [path, facts] : files.files) {
+    EMBERLOCK_ASSIGN_OR_RETURN(const UniqueFd fd, open_to_read(folder / path));
+    if (::fsync(fd.get()) != 0) return errno_error(folder / path, "cannot be written to the disk");
+    (void)::posix_fadvise(fd.get(), 0, 0, POSIX_FADV_DONTNEED);
+  }
+  for (const fs::path& within : files.folders) EMBERLOCK_RETURN_IF_ERROR(sync_folder(folder / within));
+  return sync_folder(folder);
 }
 
 }  // namespace
@@ -259,11 +319,13 @@ Status compare_copy(const fs::path& folder, const fs::path& copy, Compare compar
 Result<Backup> back_up_session(const fs::path& folder, const fs::path& backups, Compare compare,
                                const Observer& observer) {
   const fs::path from = named(folder);
-  EMBERLOCK_ASSIGN_OR_RETURN(const UniqueFd held, hold(from, LOCK_SH));
+  EMBERLOCK_ASSIGN_OR_RETURN(const UniqueFd held, hold_finished(from, Alone::no));
   EMBERLOCK_ASSIGN_OR_RETURN(const Files wanted, files_in(from));
   const fs::path copy = named(backups) / from.filename();
   EMBERLOCK_RETURN_IF_ERROR(check_apart(copy, {from}));
   const fs::path partial = named(backups) / ("." + from.filename().string() + kPartialSuffix);
+  const fs::path replaced = named(backups) / ("." + from.filename().string() + kReplacedSuffix);
+  take_back_replaced(copy, replaced);
   Backup backup{Backup::Outcome::copied, wanted.files.size(), wanted.bytes()};
   std::error_code ec;
   if (fs::exists(copy, ec)) {
@@ -273,12 +335,8 @@ Result<Backup> back_up_session(const fs::path& folder, const fs::path& backups, 
       return backup;
     }
     if (same.error().kind != ErrorKind::bad_input) return same.error();
-    EMBERLOCK_ASSIGN_OR_RETURN(const SessionCheck check, verify_session(from, part_of(observer, 0.3, 0.6)));
-    if (!check.whole())
-      return Error{ErrorKind::refused, "is damaged, and its copy is another one: " + same.error().message(),
-                   from.string(),
-                   "`emberlock sessions verify` says of each which is the better one; move the copy away if "
-                   "that is this one"};
+    EMBERLOCK_RETURN_IF_ERROR(
+        expect_may_replace(from, wanted, copy, same.error(), part_of(observer, 0.3, 0.6)));
     backup.outcome = Backup::Outcome::renewed;
   }
   fs::create_directories(partial, ec);
@@ -290,20 +348,20 @@ Result<Backup> back_up_session(const fs::path& folder, const fs::path& backups, 
   const Observer rest = part_of(observer, backup.outcome == Backup::Outcome::renewed ? 0.6 : 0, 1);
   Tally tally(2 * backup.bytes, rest);
   EMBERLOCK_RETURN_IF_ERROR(copy_missing(from, wanted, partial, tally));
-  EMBERLOCK_RETURN_IF_ERROR(
-      put_in_place(partial, copy, named(backups) / ("." + from.filename().string() + kReplacedSuffix)));
+  EMBERLOCK_RETURN_IF_ERROR(put_in_place(partial, copy, replaced));
   return backup;
 }
 
 Status remove_backed_up(const fs::path& folder, const fs::path& backups, const Observer& observer) {
   const fs::path from = named(folder);
-  EMBERLOCK_ASSIGN_OR_RETURN(const UniqueFd held, hold(from, LOCK_EX));
+  EMBERLOCK_ASSIGN_OR_RETURN(const UniqueFd held, hold_finished(from, Alone::yes));
   const fs::path copy = named(backups) / from.filename();
   EMBERLOCK_RETURN_IF_ERROR(check_apart(copy, {from}));
   std::error_code ec;
   if (!fs::exists(copy, ec))
     return Error{ErrorKind::bad_input, "has no copy in " + backups.string(), from.string(),
                  "`emberlock sessions backup` makes one"};
+  EMBERLOCK_RETURN_IF_ERROR(sync_files(copy));
   EMBERLOCK_RETURN_IF_ERROR(compare_copy(from, copy, Compare::bytes, observer));
   const fs::path removed = from.parent_path() / (std::string(kRemovedPrefix) + from.filename().string());
   fs::rename(from, removed, ec);

@@ -29,10 +29,11 @@ enum class Compare {
 
 /// Copies a session to `backups`/NAME, under the name of its folder. The copy appears once it is whole, on
 /// the disk, and read back; if interrupted, the next call goes on. A copy that differs from the session is
-/// replaced only if each frame of the session can be read: else it may be the better one. The session can't
-/// be recorded or changed by another process meanwhile. Errors: bad_input (no session; it holds something
-/// other than files and folders), refused (it isn't finished; another process writes it; it is damaged and
-/// there is another copy; cancelled by the observer), io.
+/// replaced only if it is this session's, each frame of the session can be read, and it has no fewer of them:
+/// else the copy may be the better one. The session can't be recorded or changed by another process
+/// meanwhile. Errors: bad_input (no session; it holds something other than files and folders), refused (it
+/// isn't finished; another process writes it; the copy that is there may be the better one, or is another
+/// session's; cancelled by the observer), io.
 Result<Backup> back_up_session(const std::filesystem::path& folder, const std::filesystem::path& backups,
                                Compare compare, const Observer& observer = {});
 

@@ -12,8 +12,10 @@
 #include "base/file.h"
 #include "base/nesting.h"
 #include "base/sha256.h"
+#include "session/events.h"
 #include "session/files.h"
 #include "session/json_message.h"
+#include "session/text.h"
 
 namespace emberlock::session {
 namespace fs = std::filesystem;
@@ -97,7 +99,10 @@ Result<std::vector<std::string>> files_below(const fs::path& folder) {
     if (it->is_symlink(ec))
       return Error{ErrorKind::refused, "is a link: what it leads to may change", it->path().string(),
                    "Put the file itself there"};
-    if (!it->is_directory(ec) && name != kCertificate) names.push_back(name);
+    if (it->is_directory(ec) || name == kCertificate) continue;
+    if (!it->is_regular_file(ec))
+      return Error{ErrorKind::refused, "is neither a file nor a folder", it->path().string(), "Move it away"};
+    names.push_back(name);
   }
   if (ec) return Error{ErrorKind::io, "can't be listed: " + ec.message(), folder.string()};
   std::sort(names.begin(), names.end());
@@ -151,10 +156,8 @@ Result<v1::VolumeCertificate> parse_volume_certificate(std::string_view text, co
 
 Result<v1::SessionCertificate> certify_session(const fs::path& folder, const std::string& program,
                                                const SigningKey* key, const Observer& observer) {
+  EMBERLOCK_ASSIGN_OR_RETURN(const UniqueFd held, hold_finished(folder, Alone::no));
   EMBERLOCK_ASSIGN_OR_RETURN(const v1::Manifest manifest, read_manifest(folder));
-  if (manifest.state() == v1::Manifest::RECORDING)
-    return Error{ErrorKind::refused, "isn't finished", folder.string(),
-                 "End its recording, or let `emberlock sessions repair` finish it"};
   EMBERLOCK_ASSIGN_OR_RETURN(const std::vector<std::string> names, files_below(folder));
   double bytes = 0;
   for (const std::string& name : names) bytes += size_of(folder / name);
@@ -186,24 +189,25 @@ Result<std::vector<std::string>> changed_files(const fs::path& folder, const Has
   std::vector<std::string> problems;
   for (const v1::HashedFile& file : files) {
     const fs::path path = folder / file.file();
+    const std::string name = printable(file.file());
     std::error_code ec;
     // A name from foreign hands may lead out of the folder.
     const bool inside = fs::path(file.file()).is_relative() &&
                         !fs::path(file.file()).lexically_normal().generic_string().starts_with("..");
     if (!inside || !fs::is_regular_file(path, ec)) {
-      problems.push_back(file.file() + ": is missing, and was there when it was certified");
+      problems.push_back(name + ": is missing, and was there when it was certified");
       continue;
     }
     const Observer part = seen.of_file(size_of(path));
     const Result<FileHash> hash = hash_file(path, part);
     if (!hash && hash.error().kind == ErrorKind::refused) return hash.error();
     if (!hash)
-      problems.push_back(file.file() + ": " + hash.error().what);
+      problems.push_back(name + ": " + hash.error().what);
     else if (hash->bytes != file.bytes())
-      problems.push_back(file.file() + ": has " + std::to_string(hash->bytes) + " bytes, and had " +
+      problems.push_back(name + ": has " + std::to_string(hash->bytes) + " bytes, and had " +
                          std::to_string(file.bytes()) + " when it was certified");
     else if (hash->sha256 != file.sha256())
-      problems.push_back(file.file() + ": isn't what was certified");
+      problems.push_back(name + ": isn't what was certified");
   }
   return problems;
 }
@@ -222,7 +226,8 @@ Result<std::optional<CertifiedSession>> check_certificate(const fs::path& folder
   std::set<std::string> certified;
   for (const v1::HashedFile& file : session.certificate.files()) certified.insert(file.file());
   for (const std::string& name : names)
-    if (certified.count(name) == 0) session.problems.push_back(name + ": was added after it was certified");
+    if (certified.count(name) == 0)
+      session.problems.push_back(printable(name) + ": was added after it was certified");
   return std::optional(std::move(session));
 }
 

@@ -39,6 +39,24 @@ std::string encode(const v1::Event& event) {
   return std::move(out).str();
 }
 
+Result<UniqueFd> hold_finished(const std::filesystem::path& folder, Alone alone) {
+  EMBERLOCK_ASSIGN_OR_RETURN(const v1::Manifest manifest, read_manifest(folder));
+  // NFS locks for one alone only what is open for writing.
+  const int access = alone == Alone::yes ? O_RDWR : O_RDONLY;
+  const int operation = alone == Alone::yes ? LOCK_EX : LOCK_SH;
+  UniqueFd events(::open(events_path(folder).c_str(), access | O_CLOEXEC));
+  if (!events && errno != ENOENT) return errno_error(events_path(folder), "cannot open");
+  const bool writing = events && ::flock(events.get(), operation | LOCK_NB) != 0;
+  if (writing && errno != EWOULDBLOCK) return errno_error(events_path(folder), "cannot lock");
+  if (writing)
+    return Error{ErrorKind::refused, "another process writes it", folder.string(),
+                 "Wait until that has ended"};
+  if (manifest.state() == v1::Manifest::RECORDING)
+    return Error{ErrorKind::refused, "its recording didn't end", folder.string(),
+                 "`emberlock sessions repair` ends it"};
+  return events;
+}
+
 Result<EventLog> EventLog::open(const std::filesystem::path& path, Mode mode) {
   const int flags = O_WRONLY | O_APPEND | O_CREAT | O_CLOEXEC | (mode == Mode::create ? O_EXCL : 0);
   UniqueFd fd(::open(path.c_str(), flags, 0644));

@@ -52,4 +52,10 @@ class EventLog {
   std::unique_ptr<Disk> disk_ = std::make_unique<Disk>();
 };
 
+/// Whether others may hold it too.
+enum class Alone { no, yes };
+/// A finished session, which nobody records or changes while this exists; nothing is held of one that has no
+/// events. Errors: refused (another process writes it; its recording didn't end), bad_input (no session), io.
+Result<UniqueFd> hold_finished(const std::filesystem::path& folder, Alone alone);
+
 }  // namespace emberlock::session

@@ -58,19 +58,6 @@ v1::ListSessionsResponse::Entry entry_of(const fs::path& folder) {
   return entry;
 }
 
-/// The folders of all sessions, finished or not. Other entries are ignored.
-std::vector<fs::path> folders_in(const fs::path& folder) {
-  std::vector<fs::path> found;
-  std::error_code ec;
-  for (fs::directory_iterator at(folder, ec), end; !ec && at != end; at.increment(ec)) {
-    const std::string name = at->path().filename().string();
-    if ((is_folder_name(name) || check_session_name(name)) && SessionReader::is_session(at->path()))
-      found.push_back(at->path());
-  }
-  std::sort(found.begin(), found.end());
-  return found;
-}
-
 /// Whether a folder that came from elsewhere has this name with its marks apart.
 bool looks_taken(const fs::path& folder, const std::string& stored) {
   std::error_code ec;
@@ -101,6 +88,18 @@ std::uint64_t bytes_below(const fs::path& folder) {
   return bytes;
 }
 
+std::vector<fs::path> sessions_in(const fs::path& folder) {
+  std::vector<fs::path> found;
+  std::error_code ec;
+  for (fs::directory_iterator at(folder, ec), end; !ec && at != end; at.increment(ec)) {
+    const std::string name = at->path().filename().string();
+    if ((is_folder_name(name) || check_session_name(name)) && SessionReader::is_session(at->path()))
+      found.push_back(at->path());
+  }
+  std::sort(found.begin(), found.end());
+  return found;
+}
+
 Result<SessionStore> SessionStore::open(fs::path folder, StoreOptions options) {
   if (!folder.has_filename()) folder = folder.parent_path();  // a trailing slash
   std::error_code ec;
@@ -115,7 +114,7 @@ Result<SessionStore> SessionStore::open(fs::path folder, StoreOptions options) {
 
 v1::ListSessionsResponse SessionStore::list() const {
   v1::ListSessionsResponse response;
-  for (const fs::path& folder : folders_in(folder_)) *response.add_sessions() = entry_of(folder);
+  for (const fs::path& folder : sessions_in(folder_)) *response.add_sessions() = entry_of(folder);
   std::stable_sort(response.mutable_sessions()->begin(), response.mutable_sessions()->end(),
                    [](const auto& a, const auto& b) { return a.created_utc() > b.created_utc(); });
   return response;
@@ -178,7 +177,7 @@ Result<v1::StorageStatus> SessionStore::storage(double bytes_per_s) const {
 
 std::vector<fs::path> SessionStore::unfinished() const {
   std::vector<fs::path> found;
-  for (const fs::path& folder : folders_in(folder_)) {
+  for (const fs::path& folder : sessions_in(folder_)) {
     // Most sessions are finished; the text shows that before the manifest is parsed.
     const auto text = read_file(manifest_path(folder));
     const std::string& word = v1::Manifest::State_Name(v1::Manifest::RECORDING);
@@ -191,7 +190,7 @@ std::vector<fs::path> SessionStore::unfinished() const {
 
 std::vector<fs::path> SessionStore::finished() const {
   std::vector<fs::path> found;
-  for (const fs::path& folder : folders_in(folder_)) {
+  for (const fs::path& folder : sessions_in(folder_)) {
     const auto manifest = read_manifest(folder);
     if (manifest.ok() && manifest->state() != v1::Manifest::RECORDING) found.push_back(folder);
   }

@@ -24,6 +24,9 @@ struct StoreOptions {
 /// Bytes of all files below `folder` whose size can be read.
 std::uint64_t bytes_below(const std::filesystem::path& folder);
 
+/// The folders of all sessions in a folder, finished or not, by name. Other entries are ignored.
+std::vector<std::filesystem::path> sessions_in(const std::filesystem::path& folder);
+
 /// The folder that holds all sessions, one folder each. Thread-safe.
 class SessionStore {
  public:

@@ -93,6 +93,18 @@ std::string to_utf8(std::u32string_view text) {
   return bytes;
 }
 
+std::string printable(std::string_view text) {
+  const auto is_control = [](char32_t c) { return c < 0x20 || (c >= 0x7F && c < 0xA0); };
+  if (auto characters = from_utf8(text)) {
+    std::replace_if(characters->begin(), characters->end(), is_control, U'?');
+    return to_utf8(*characters);
+  }
+  std::string ascii(text);
+  std::replace_if(
+      ascii.begin(), ascii.end(), [](unsigned char c) { return c < 0x20 || c >= 0x7F; }, '?');
+  return ascii;
+}
+
 std::u32string composed(std::u32string_view text) {
   std::u32string result;
   for (const char32_t c : text) {

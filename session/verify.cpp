@@ -190,7 +190,7 @@ Result<SessionCheck> verify_session(const fs::path& folder, const Observer& obse
         return {};
       }));
   check_events(folder, check);
-  const bool readable = check.whole();
+  check.readable = check.whole();
   EMBERLOCK_RETURN_IF_ERROR(check_certified(folder, part_of(observer, kDecoding, 1), check));
   if (check.state == v1::Manifest::RECORDING) {
     check.problems.emplace_back(
@@ -199,7 +199,7 @@ Result<SessionCheck> verify_session(const fs::path& folder, const Observer& obse
         "Wait for its recorder; if that was killed, `emberlock sessions repair` keeps what reached the disk";
   } else if (holds_nothing(check)) {
     check.to_do = "Nothing was recorded, or nothing of it is left: record again";
-  } else if (readable && !check.whole()) {
+  } else if (check.readable && !check.whole()) {
     check.to_do =
         "Restore the named files from a copy; if the change was meant, such as a repair, certify the session "
         "anew";

@@ -31,6 +31,7 @@ struct SessionCheck {
   std::string to_do;                  ///< one sentence; empty if there is nothing to do
   std::uint64_t certified_files = 0;  ///< that certificate.json tells of and that are as it says; 0: without
   std::string certified_by;           ///< the public key that signed it; empty: none did
+  bool readable = false;              ///< it is whole, but for what certificate.json may say
 
   /// Finished and complete: every camera has at least one frame and all recorded frames.
   [[nodiscard]] bool whole() const;

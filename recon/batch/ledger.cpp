@@ -133,17 +133,16 @@ Result<std::optional<Ledger::Claim>> Ledger::take_from(const std::string& chunk,
     fs::remove(claimed, ec);
     return std::optional<Claim>();
   }
-  EMBERLOCK_RETURN_IF_ERROR(put_empty_file(folder_ / "lost" / theirs));
   const std::vector<std::string> lost = losses();
-  const auto died = std::count_if(lost.begin(), lost.end(),
-                                  [&](const std::string& name) { return parts_of(name).first == chunk; });
-  if (static_cast<std::size_t>(died) >= kMostLosses) {
-    EMBERLOCK_ASSIGN_OR_RETURN([[maybe_unused]] const Moved moved,
-                               move(claimed, folder_ / "given_up" / chunk));
-    return std::optional<Claim>();
-  }
-  EMBERLOCK_ASSIGN_OR_RETURN(const Moved moved, move_to_own(claimed, folder_ / "claims" / mine(chunk)));
+  const auto died = 1 + std::count_if(lost.begin(), lost.end(),
+                                      [&](const std::string& name) { return parts_of(name).first == chunk; });
+  const bool gives_up = static_cast<std::size_t>(died) >= kMostLosses;
+  EMBERLOCK_ASSIGN_OR_RETURN(
+      const Moved moved,
+      move_to_own(claimed, gives_up ? folder_ / "given_up" / chunk : folder_ / "claims" / mine(chunk)));
   if (moved != Moved::yes) return std::optional<Claim>();
+  EMBERLOCK_RETURN_IF_ERROR(put_empty_file(folder_ / "lost" / theirs));
+  if (gives_up) return std::optional<Claim>();
   std::error_code ec;
   fs::path left = folder_ / "partial" / chunk;  // of one who died giving it back
   if (!fs::exists(left, ec)) left = folder_ / "work" / theirs;
@@ -213,9 +212,10 @@ Status Ledger::reopen(const std::string& chunk) {
   }
   // Claimed first: the chunk is in someone's hands while its result moves.
   EMBERLOCK_RETURN_IF_ERROR(put_empty_file(folder_ / "claims" / mine(chunk)));
+  EMBERLOCK_ASSIGN_OR_RETURN(const Moved moved, move(result(chunk), folder_ / "work" / mine(chunk)));
+  if (moved != Moved::yes) return drop(chunk);      // by another run's first rank
   fs::remove_all(folder_ / "partial" / chunk, ec);  // of an attempt that came second
-  EMBERLOCK_ASSIGN_OR_RETURN([[maybe_unused]] const Moved moved,
-                             move(result(chunk), folder_ / "work" / mine(chunk)));
+  fs::remove(folder_ / "given_up" / chunk, ec);     // before one that was taken for dead had done it
   return give_back({chunk, folder_ / "work" / mine(chunk)});
 }
 
@@ -226,7 +226,7 @@ bool Ledger::done(const std::string& chunk) const {
 
 bool Ledger::given_up(const std::string& chunk) const {
   std::error_code ec;
-  return fs::exists(folder_ / "given_up" / chunk, ec);
+  return fs::exists(folder_ / "given_up" / chunk, ec) && !done(chunk);
 }
 
 bool Ledger::settled() const {
@@ -242,6 +242,11 @@ std::vector<fs::path> Ledger::unfinished() const {
 }
 
 std::vector<std::string> Ledger::losses() const { return names_in(folder_ / "lost"); }
+
+void Ledger::forget_losses() const {
+  std::error_code ec;
+  for (const std::string& name : losses()) fs::remove(folder_ / "lost" / name, ec);
+}
 
 void Ledger::tidy() const {
   std::error_code ec;

@@ -66,8 +66,8 @@ class Ledger {
   static void empty(const Claim& claim);
   /// Whoever takes it next goes on with what is in the work's folder. Error: io.
   Status give_back(const Claim& claim);
-  /// Lets a chunk that is done, or given up, be done again, on top of what is there. Not while others finish
-  /// it. Error: io.
+  /// Lets a chunk that is done, or given up, be done again, on top of what is there. No effect where another
+  /// one did so before. Not while others finish it. Error: io.
   Status reopen(const std::string& chunk);
 
   [[nodiscard]] bool done(const std::string& chunk) const;
@@ -82,6 +82,8 @@ class Ledger {
   [[nodiscard]] std::vector<std::filesystem::path> unfinished() const;
   /// CHUNK.WORKER of those who died of one.
   [[nodiscard]] std::vector<std::string> losses() const;
+  /// They count from now on: an end of the whole run, such as by its time limit, is no chunk's fault.
+  void forget_losses() const;
   /// Removes what attempts that came to nothing left behind. Only where all is settled.
   void tidy() const;
 

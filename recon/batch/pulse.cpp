@@ -57,12 +57,18 @@ std::uint64_t start_of(std::int64_t pid) {
   return ticks;
 }
 
+struct FileTime {
+  bool is_there = true;
+  std::optional<std::int64_t> changed;  ///< ns; nothing where the file server doesn't tell
+};
+
 /// By an open file, which a file server's clients ask the server for.
-std::optional<std::int64_t> changed(const fs::path& path) {
+FileTime time_of(const fs::path& path) {
   const UniqueFd fd(::open(path.c_str(), O_RDONLY | O_CLOEXEC));
+  if (fd.get() < 0) return {errno != ENOENT, std::nullopt};
   struct stat info {};
-  if (fd.get() < 0 || ::fstat(fd.get(), &info) != 0) return std::nullopt;
-  return std::int64_t{info.st_mtim.tv_sec} * 1'000'000'000 + info.st_mtim.tv_nsec;
+  if (::fstat(fd.get(), &info) != 0) return {};
+  return {true, std::int64_t{info.st_mtim.tv_sec} * 1'000'000'000 + info.st_mtim.tv_nsec};
 }
 
 }  // namespace
@@ -128,16 +134,16 @@ void Pulse::beat() {
 
 Life Pulse::life_of(const std::string& worker) {
   const fs::path path = workers_ / worker;
-  const std::optional<std::int64_t> now_changed = changed(path);
-  if (!now_changed) return Life::gone;  // it took its file away, or never was
+  const FileTime now = time_of(path);
+  if (!now.is_there) return Life::gone;  // it took its file away, or never was
   const auto [entry, first] = seen_.try_emplace(worker);
   Seen& seen = entry->second;
-  if (first)
+  if (seen.worker.host.empty())
     if (const auto text = read_file(path))
       if (auto parsed = parse_worker(*text, path.string())) seen.worker = std::move(*parsed);
   if (const auto runs = runs_here(seen.worker)) return *runs ? Life::alive : Life::gone;
-  if (first || seen.changed != *now_changed) {
-    seen.changed = *now_changed;
+  if (first || (now.changed && seen.changed != *now.changed)) {
+    seen.changed = now.changed.value_or(0);
     seen.at = clock_.now();
     return Life::alive;
   }

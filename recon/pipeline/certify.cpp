@@ -186,10 +186,12 @@ Status tell_session(const fs::path& folder, const SceneOptions& options, FileHas
   return {};
 }
 
-/// Below the input's folder as it lies there, elsewhere by its name alone.
+/// Below the input's folder as it lies there, elsewhere by its name alone; however both were typed.
 std::string name_beside(const fs::path& input, const fs::path& path) {
+  fs::path beside = fs::absolute(input).lexically_normal();
+  if (!beside.has_filename()) beside = beside.parent_path();  // "take2/"
   const std::string relative =
-      path.lexically_normal().lexically_relative(input.lexically_normal().parent_path()).generic_string();
+      fs::absolute(path).lexically_normal().lexically_relative(beside.parent_path()).generic_string();
   return relative.empty() || relative.starts_with("..") ? path.filename().string() : relative;
 }
 

@@ -150,10 +150,11 @@ TEST_F(Batch, TwoRanksShareTheWorkAndTheFirstTellsOfIt) {
 }
 
 TEST_F(Batch, AKilledRankCostsNoMoreThanItsChunk) {
+  std::optional<pid_t> pid;
   const Shell run = run_and_at(
-      mpirun("--enable-recovery -n 2") + command(), [&] { return pid_at_work().has_value(); },
+      mpirun("--enable-recovery -n 2") + command(), [&] { return (pid = pid_at_work()).has_value(); },
       [&] {
-        if (const auto pid = pid_at_work()) ::kill(*pid, SIGKILL);
+        if (pid) ::kill(*pid, SIGKILL);
       });
   expect_same_volumes();
   EXPECT_EQ(names_in("lost").size(), 1U) << run.output;
@@ -161,10 +162,11 @@ TEST_F(Batch, AKilledRankCostsNoMoreThanItsChunk) {
 }
 
 TEST_F(Batch, AKilledRunGoesOnOnAnotherNumberOfRanks) {
+  std::optional<pid_t> pid;
   const Shell killed = run_and_at(
-      command(), [&] { return names_in("done").size() == 1 && pid_at_work(); },
+      command(), [&] { return names_in("done").size() == 1 && (pid = pid_at_work()); },
       [&] {
-        if (const auto pid = pid_at_work()) ::kill(*pid, SIGKILL);
+        if (pid) ::kill(*pid, SIGKILL);
       });
   EXPECT_NE(killed.status, 0);
   EXPECT_LT(names_in("done").size(), 4U) << killed.output;
@@ -174,10 +176,11 @@ TEST_F(Batch, AKilledRunGoesOnOnAnotherNumberOfRanks) {
 }
 
 TEST_F(Batch, AStoppedRunKeepsTheFramesThatAreDone) {
+  std::optional<pid_t> pid;
   const Shell stopped = run_and_at(
-      "exec " + command(), [&] { return pid_at_work().has_value(); },
+      "exec " + command(), [&] { return (pid = pid_at_work()).has_value(); },
       [&] {
-        if (const auto pid = pid_at_work()) ::kill(*pid, SIGTERM);
+        if (pid) ::kill(*pid, SIGTERM);
       });
   EXPECT_EQ(stopped.status, 1) << stopped.output;
   EXPECT_THAT(stopped.output, HasSubstr("ended early, as asked"));

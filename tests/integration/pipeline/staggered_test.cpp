@@ -7,6 +7,7 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <unistd.h>
 
 #include "base/file.h"
 #include "cli/commands.h"
@@ -39,7 +40,9 @@ class Staggered : public testing::Test {
   static void TearDownTestSuite() { fs::remove_all(folder()); }
   Staggered() { fs::remove_all(out()); }
 
-  static fs::path folder() { return fs::path(testing::TempDir()) / "staggered"; }
+  static fs::path folder() {
+    return fs::path(testing::TempDir()) / ("staggered-" + std::to_string(::getpid()));
+  }
   static fs::path session() { return folder() / "film" / "session"; }
   [[nodiscard]] test::VerbRun reconstruct(const fs::path& input, const std::string& frames,
                                           const std::vector<std::string>& more) const {

@@ -161,11 +161,12 @@ TEST_F(BatchCommandTest, SlurmThatIsNotThereOrRefusesIsTold) {
 /// The shell reads the script's words as they were.
 TEST_F(BatchCommandTest, WordsOfAScriptMayHoldAnything) {
   ::setenv("PATH", path_.c_str(), 1);
-  std::string script = sbatch_script({}, {"a b", "it's", "$HOME", "\"q\""}, temp_ / "o");
+  std::string script = sbatch_script({}, {"a b", "it's", "", "$HOME", "\"q\""}, temp_ / "100%o");
+  EXPECT_THAT(script, HasSubstr("100%%o/slurm/job-%j.txt"));
   const std::size_t command = script.find("exec srun");
   std::ofstream(temp_ / "s") << "srun() { while [[ $1 == --* ]]; do shift; done; printf '%s\\n' \"$@\"; }\n"
                              << script.substr(command + 5);
-  EXPECT_EQ(shell("bash " + (temp_ / "s").string()).output, "a b\nit's\n$HOME\n\"q\"\n");
+  EXPECT_EQ(shell("bash " + (temp_ / "s").string()).output, "a b\nit's\n\n$HOME\n\"q\"\n");
 }
 
 TEST(BatchProgressTest, TimeLeftFollowsFromTheRateSinceTheBegin) {

@@ -126,8 +126,8 @@ TEST_F(VerifyVolumeTest, JsonIsForPrograms) {
 
 TEST_F(VerifyVolumeTest, WhatForeignHandsWroteMovesNoCursor) {
   recon::Certification certification = recon::simulated();
-  certification.certificate.set_program("\x1b[2Jclean");
-  EXPECT_THAT(verify(write(certification)).out, Not(HasSubstr("\x1b")));
+  certification.certificate.set_program("\x1b[2J\u009b1mclean");
+  EXPECT_THAT(verify(write(certification)).out, HasSubstr("?[2J?1mclean"));
 }
 
 TEST_F(VerifyVolumeTest, ReconstructWritesTheSameSignedVolumeTwiceAndExportsTellOfIt) {
@@ -161,7 +161,9 @@ TEST_F(VerifyVolumeTest, ReconstructWritesTheSameSignedVolumeTwiceAndExportsTell
   EXPECT_THAT(exported({"--format", "vti", "--key", key_.private_pem.string()}).err,
               HasSubstr("carry no certificate to sign"));
   change_a_byte(folder_ / "one" / "volume.vdb");
-  EXPECT_NE(exported({}).exit_code, 0) << "a changed volume isn't certified anew";
+  const auto refused = exported({});
+  EXPECT_NE(refused.exit_code, 0) << "a changed volume isn't certified anew";
+  EXPECT_THAT(refused.err, HasSubstr("isn't what its certificate seals"));
 }
 
 TEST_F(VerifyVolumeTest, SessionsAreCertifiedAndVerified) {

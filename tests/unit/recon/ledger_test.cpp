@@ -285,6 +285,30 @@ TEST_F(LedgerOfTwo, AResultIsOpenedAgainWithWhatItHolds) {
   EXPECT_TRUE(fs::exists(again->work / "frame"));
 }
 
+TEST_F(LedgerOfTwo, TwoRunsThatOpenAResultAtOnceLoseNothingOfIt) {
+  const auto claim = *first_.take(kAllLive);
+  write(*claim, "frame");
+  ASSERT_TRUE(*first_.finish(*claim));
+  ASSERT_TRUE(first_.reopen("a").ok());
+  ASSERT_TRUE(second_.reopen("a").ok()) << "which found it done before the first opened it";
+  EXPECT_TRUE(fs::is_empty(folder_ / "claims"));
+  const auto again = *second_.take(kAllLive);
+  EXPECT_EQ(again->chunk, "a");
+  EXPECT_TRUE(fs::exists(again->work / "frame"));
+}
+
+TEST_F(LedgerOfTwo, OneThatIsDoneAfterAllIsNotGivenUp) {
+  const auto claim = *first_.take(kAllLive);
+  write(*claim, "frame");
+  fs::rename(folder_ / "claims" / "a.first", folder_ / "given_up" / "a");  // it was silent, as two before
+  EXPECT_TRUE(second_.given_up("a"));
+  EXPECT_TRUE(*first_.finish(*claim));
+  EXPECT_FALSE(second_.given_up("a"));
+  ASSERT_TRUE(second_.reopen("a").ok());
+  EXPECT_FALSE(second_.given_up("a"));
+  EXPECT_FALSE(second_.settled());
+}
+
 TEST_F(LedgerOfTwo, AFolderThatCantBeWrittenToIsAnError) {
   fs::remove_all(folder_ / "work");
   std::ofstream(folder_ / "work") << "a file";

@@ -11,6 +11,8 @@
 #include <gtest/gtest.h>
 
 #include "base/random.h"
+#include "session/certificate.h"
+#include "session/files.h"
 #include "session/salvage.h"
 #include "session/verify.h"
 #include "tests/support/recording.h"
@@ -119,6 +121,67 @@ TEST(SessionBackup, ACopyIsNotReplacedByADamagedSession) {
   EXPECT_EQ(refused.error().kind, ErrorKind::refused);
   EXPECT_THAT(refused.error().message(), HasSubstr("is damaged"));
   EXPECT_EQ(bytes_of(store.copy / "cam0/000000.mkv"), good);
+}
+
+/// Nothing is copied, and the copy is as it was.
+void expect_kept_from_replacing(const Store& store, const std::string& why,
+                                Compare compare = Compare::times) {
+  const std::string before = bytes_of(store.copy / "manifest.json");
+  const auto refused = store.back_up(compare);
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().kind, ErrorKind::refused);
+  EXPECT_THAT(refused.error().message(), HasSubstr(why));
+  EXPECT_EQ(bytes_of(store.copy / "manifest.json"), before);
+  EXPECT_TRUE(verify_session(store.copy)->whole());
+}
+
+TEST(SessionBackup, ACopyOfAnotherSessionOfThatNameIsNotReplaced) {
+  const Store store;
+  store.back_up_well(Backup::Outcome::copied);
+  fs::remove_all(store.session);  // as `prune` does
+  test::record(store.session, kBackedUpLayout, 9, test::small_disk_options());
+  auto manifest = read_manifest(store.session);
+  ASSERT_TRUE(manifest);
+  manifest->set_created_utc("2031-01-01T00:00:00Z");
+  ASSERT_TRUE(write_manifest(store.session, *manifest));
+  expect_kept_from_replacing(store, "another session's copy");
+}
+
+TEST(SessionBackup, ACopyWithMoreFramesIsNotReplacedByWhatARepairLeft) {
+  const Store store;
+  store.back_up_well(Backup::Outcome::copied);
+  const fs::path segment = store.session / "cam0/000000.mkv";
+  const std::string good = bytes_of(segment);
+  put_bytes(segment, std::string(good).replace(good.size() / 2, 64, 64, '\0'));
+  ASSERT_TRUE(repair_session(store.session));
+  ASSERT_TRUE(verify_session(store.session)->whole());
+  expect_kept_from_replacing(store, "its copy 6");
+}
+
+TEST(SessionBackup, AFileThatNoHashTellsOfIsNotTakenForTheBetterOne) {
+  const Store store;
+  put_bytes(store.session / "notes.txt", "as it was written");
+  store.back_up_well(Backup::Outcome::copied);
+  rot(store.session / "notes.txt", 3);
+  expect_kept_from_replacing(store, "one of them is damaged", Compare::bytes);
+}
+
+TEST(SessionBackup, ASessionWhoseCertificateIsVoidSinceItWasCompressedIsCopiedAnew) {
+  const Store store(Encoding::raw_nut);
+  ASSERT_TRUE(certify_session(store.session, "emberlock", nullptr));
+  store.back_up_well(Backup::Outcome::copied);
+  ASSERT_TRUE(transcode(store.session));
+  ASSERT_FALSE(verify_session(store.session)->whole());
+  const auto done = store.back_up();
+  ASSERT_TRUE(done) << done.error().message();
+  EXPECT_EQ(done->outcome, Backup::Outcome::renewed);
+}
+
+TEST(SessionBackup, ACopyWhoseReplacementWasCutShortIsThereAgain) {
+  const Store store(Encoding::raw_nut);
+  store.back_up_well(Backup::Outcome::copied);
+  fs::rename(store.copy, store.backups / ".take 1.replaced");
+  store.back_up_well(Backup::Outcome::kept);
 }
 
 TEST(SessionBackup, ACopyThatRottedIsFoundByReadingAndRenewed) {

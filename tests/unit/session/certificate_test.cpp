@@ -7,6 +7,7 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sys/stat.h>
 
 #include "base/random.h"
 #include "session/files.h"
@@ -191,10 +192,13 @@ TEST_F(SessionCertificateTest, UnfinishedSessionsLinksAndInterruptionsAreRefused
   fs::create_symlink(session_ / "manifest.json", session_ / "link");
   EXPECT_THAT(refused(), HasSubstr("is a link"));
   fs::remove(session_ / "link");
+  ASSERT_EQ(::mkfifo((session_ / "pipe").c_str(), 0600), 0);
+  EXPECT_THAT(refused(), HasSubstr("neither a file nor a folder"));
+  fs::remove(session_ / "pipe");
   v1::Manifest manifest = read_manifest(session_).value();
   manifest.set_state(v1::Manifest::RECORDING);
   ASSERT_TRUE(write_manifest(session_, manifest).ok());
-  EXPECT_EQ(refused(), "isn't finished");
+  EXPECT_EQ(refused(), "its recording didn't end");
   EXPECT_FALSE(fs::exists(certificate_path(session_)));
 }
 

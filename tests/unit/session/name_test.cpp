@@ -5,6 +5,8 @@
 
 #include <gtest/gtest.h>
 
+#include "session/text.h"
+
 namespace emberlock::session {
 namespace {
 
@@ -96,6 +98,12 @@ TEST(Text, IsBoundedAndOnOneLine) {
     EXPECT_EQ(status.error().where, "field purpose");
     EXPECT_LT(status.error().message().size(), 250U);
   }
+}
+
+TEST(SessionName, ForeignTextMovesNoTerminalsCursor) {
+  EXPECT_EQ(printable("Flamme 3 \u00e9\u706b"), "Flamme 3 \u00e9\u706b");
+  EXPECT_EQ(printable("\x1b[2J\r\n\x7f\u009b"), "?[2J????");
+  EXPECT_EQ(printable("\xff\x9b\x1b[ and \xc3"), "???[ and ?");
 }
 
 TEST(SessionName, WhatWindowsCannotHoldIsRefused) {

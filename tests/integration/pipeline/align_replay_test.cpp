@@ -77,9 +77,10 @@ class AlignReplay : public testing::Test {
     const auto replayed = rig::replay_align(folder_, into(again), {}, &seed);
     EXPECT_TRUE(replayed.ok()) << replayed.error().message();
     EXPECT_EQ(live, again);
-    if (replayed.ok())
+    if (replayed.ok()) {
       EXPECT_EQ(rig::summary_json(*recorded, bench.options.seed).dump(),
                 rig::summary_json(*replayed, seed).dump());
+    }
     return *recorded;
   }
   void expect_differs_in_round_1() const {

@@ -137,8 +137,13 @@ Result<float> white_of(const ExportArguments& a, const std::vector<ResultVolume>
   float white = 0;
   bool empty = true;
   const Status read = each_volume(volumes, a.out, bar, 0, kShare, [&](const ResultVolume& from) -> Status {
-    // Before it is read: of a file that was changed its certificate says more than its reader.
-    EMBERLOCK_ASSIGN_OR_RETURN([[maybe_unused]] const auto certified, recon::check_volume(from.file));
+    // Of a file that was changed its certificate says more than its reader.
+    if (const auto certified = recon::check_volume(from.file);
+        !certified && certified.error().kind == ErrorKind::refused) {
+      Error changed = certified.error();
+      changed.kind = ErrorKind::bad_input;
+      return changed;
+    }
     EMBERLOCK_ASSIGN_OR_RETURN(const recon::SharedVolume volume, recon::read_shared_volume(from.file));
     white = std::max(white, recon::brightest(volume));
     for (const recon::SharedGrid& grid : volume.grids)

@@ -6,6 +6,7 @@
 #include <cstdio>
 #include <cstring>
 #include <fstream>
+#include <set>
 #include <system_error>
 #include <utility>
 
@@ -230,8 +231,11 @@ bool Ledger::given_up(const std::string& chunk) const {
 }
 
 bool Ledger::settled() const {
+  std::vector<std::string> found = names_in(folder_ / "done");  // two requests, however many chunks there are
+  for (std::string& name : names_in(folder_ / "given_up")) found.push_back(std::move(name));
+  const std::set<std::string> settled(found.begin(), found.end());
   return std::all_of(chunks_.begin(), chunks_.end(),
-                     [&](const std::string& chunk) { return done(chunk) || given_up(chunk); });
+                     [&](const std::string& chunk) { return settled.contains(chunk); });
 }
 
 std::vector<fs::path> Ledger::unfinished() const {

@@ -51,7 +51,7 @@ Result<Device> device_of(const Rank& rank, Device asked, bool own_gpus) {
 
 Seconds idle_wait(const Rank& rank, Seconds patience) {
   constexpr Seconds kShortest{0.1}, kOfEachRank{0.02};
-  return std::max(kShortest, std::min(rank.count * kOfEachRank, 0.1 * patience));
+  return std::max(kShortest, std::min(rank.count * kOfEachRank, patience / 3));
 }
 
 int threads_of(const Rank& rank, int cores, int allowed) {

@@ -27,8 +27,8 @@ Rank rank_from(const std::function<const char*(const char* name)>& environment);
 Result<Device> device_of(const Rank& rank, Device asked, bool own_gpus);
 
 /// How long a rank that finds nothing to do waits until it asks again: together they ask fifty times a second
-/// at most, as each time costs the shared folder some hundred requests, and each of them ten times within its
-/// `patience`.
+/// at most, as each time costs the shared folder two requests for each chunk that is at work, and each of
+/// them asks three times within its `patience`.
 Seconds idle_wait(const Rank& rank, Seconds patience);
 
 /// CPU threads of a rank: its share of the machine's cores, no more than it may run on (its affinity).

@@ -67,13 +67,11 @@ void print_ledger(const fs::path& folder, int chunks) {
 }
 
 struct Parts {
-  double first = 0, next = 0, start = 0, tell = 0, request = 0;
+  double first = 0, next = 0, start = 0, tell = 0;
   int frames = 1440, chunk = 0;
+  double requests = 0;  ///< to the shared folder, a frame
+  double server = 1e9;  ///< requests a second that it answers
 };
-
-/// An idle rank's look: it lists two folders, and asks for each chunk's claim and result.
-constexpr double kRequestsPerLook = 2;
-constexpr double kRequestsPerChunk = 12;  ///< to take it, to finish it, to link its volumes
 
 void print_ranks(const Parts& parts) {
   const int chunk =
@@ -82,21 +80,21 @@ void print_ranks(const Parts& parts) {
   for (int left = parts.frames; left > 0; left -= chunk)
     chunks.emplace_back(parts.first + (std::min(left, chunk) - 1) * parts.next);
   const double frames = report::time_on(1, chunks).value();
-  const double alone = parts.start + frames + parts.tell;
+  const double requests = parts.frames * parts.requests;
+  const double alone = parts.start + std::max(frames, requests / parts.server) + parts.tell;
   std::printf("%d frames in %zu chunks of %d\n", parts.frames, chunks.size(), chunk);
-  std::printf("ranks     total s   times as fast   frames' share   idle ranks' requests a second\n");
+  std::printf(
+      "| ranks | seconds | times as fast | requests a second, at work | idle |\n|---|---|---|---|---|\n");
   for (const std::size_t ranks : {1, 2, 8, 32, 64, 128, 256, 512, 1000}) {
     recon::Rank rank;
     rank.count = static_cast<int>(ranks);
-    const double work = report::time_on(ranks, chunks).value();
-    // The ledger's own requests stand in one row at the file server.
-    const double ledger = kRequestsPerChunk * static_cast<double>(chunks.size()) * parts.request;
-    const double total = parts.start + std::max(work, ledger) + parts.tell;
+    const double work = std::max(report::time_on(ranks, chunks).value(), requests / parts.server);
+    const double total = parts.start + work + parts.tell;
+    // An idle rank lists four folders, and asks twice for each chunk's owner.
     const double idle = ranks > chunks.size() ? static_cast<double>(ranks - chunks.size()) : 0;
     const double looks = idle / recon::idle_wait(rank, Seconds(60)).value();
-    std::printf("%5zu %11.1f %15.1f %14.0f%% %20.0f\n", ranks, total, alone / total,
-                100 * frames / static_cast<double>(ranks) / total,
-                looks * (kRequestsPerLook + 2 * static_cast<double>(chunks.size())));
+    std::printf("| %zu | %.1f | %.1f | %.0f | %.0f |\n", ranks, total, alone / total, requests / work,
+                looks * (4 + 2 * static_cast<double>(chunks.size())));
   }
 }
 
@@ -120,7 +118,8 @@ int main(int argc, char** argv) {
   ranks->add_option("--chunk", parts.chunk);
   ranks->add_option("--start", parts.start);
   ranks->add_option("--tell", parts.tell);
-  ranks->add_option("--request", parts.request);
+  ranks->add_option("--requests", parts.requests)->check(CLI::NonNegativeNumber);
+  ranks->add_option("--server", parts.server)->check(CLI::PositiveNumber);
   CLI11_PARSE(app, argc, argv);
   if (*ledger) {
     fs::create_directories(fs::path(folder).parent_path());

@@ -96,8 +96,8 @@ Status CameraReader::grow_to(std::uint64_t frames) {
   const fs::path path = index_path(folder_, camera_id_);
   EMBERLOCK_ASSIGN_OR_RETURN(const std::string bytes, read_part(path, records_.size(), frames));
   EMBERLOCK_ASSIGN_OR_RETURN(ParsedIndex index, parse_index(encode_index_header() + bytes, path.string()));
-  const bool follows_on = records_.empty() || index.records.empty() ||
-                          follows(records_.back(), index.records.front());
+  const bool follows_on =
+      records_.empty() || index.records.empty() || follows(records_.back(), index.records.front());
   if (!follows_on || records_.size() + index.records.size() != frames)
     return Error{ErrorKind::bad_input,
                  "the index has " + std::to_string(records_.size() + index.records.size()) +

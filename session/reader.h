@@ -15,8 +15,8 @@ namespace emberlock::session {
 
 class CameraReader;
 
-/// Reads the folder of a finished session, or follows one that is being recorded. Different cameras may be read by different threads at the same
-/// time; one camera by one thread at a time.
+/// Reads the folder of a finished session, or follows one that is being recorded. Different cameras may be
+/// read by different threads at the same time; one camera by one thread at a time.
 class SessionReader {
  public:
   /// Errors: bad_input (no session; damaged manifest, index or events; not finished: run `salvage` first),

@@ -9,7 +9,7 @@
 #include <gtest/gtest.h>
 #include <rapidcheck/gtest.h>
 
-#include "tests/support/small_scene.h"
+#include "tests/support/ball_scene.h"
 
 namespace emberlock::recon {
 namespace {
@@ -34,7 +34,8 @@ std::vector<FrameStamp> even_stamps(std::size_t count, double late = 0) {
   return stamps_at(periods);
 }
 
-std::optional<std::size_t> next_of(NewestFrames& frames, const std::vector<std::vector<FrameStamp>>& cameras) {
+std::optional<std::size_t> next_of(NewestFrames& frames,
+                                   const std::vector<std::vector<FrameStamp>>& cameras) {
   std::vector<FramesSoFar> so_far;
   so_far.reserve(cameras.size());
   for (const auto& stamps : cameras) so_far.push_back({&stamps, Hertz(kFilmRate)});
@@ -167,7 +168,7 @@ TEST(LiveVoxels, AreChosenAnewWhenTheMachineIsNeededElsewhere) {
 }
 
 TEST(LiveVoxels, MemoryBoundsThem) {
-  const Scene scene = test::small_scene({16, 12}, 8);
+  const Scene scene = ball_scene({.views = 3, .image = {16, 12}});
   EXPECT_EQ(most_voxels(scene, {}, 1e12), kMostLiveVoxels);
   EXPECT_EQ(most_voxels(scene, {}, 0), kFewestLiveVoxels);
   const int some = most_voxels(scene, {}, 50e6);

@@ -1,0 +1,188 @@
+// SPDX-License-Identifier: Apache-2.0
+// Volumes of a recording while it goes on: the engine with simulated cameras before a flame, and the program
+// that reconstructs.
+#include <csignal>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include <gmock/gmock.h>
+#include <unistd.h>
+
+#include "daemon/engine/engine.h"
+#include "session/reader.h"
+#include "tests/support/recording.h"
+#include "tests/support/wait.h"
+
+namespace emberlock {
+namespace {
+namespace fs = std::filesystem;
+using testing::HasSubstr;
+using State = v1::LiveStatus;
+
+constexpr std::chrono::minutes kPatience{4};
+
+class LiveVolumesProgramTest : public testing::Test {
+ protected:
+  LiveVolumesProgramTest() {
+    config_.rig.name = "small";
+    rig::CameraConfig cameras;
+    cameras.count = 4;
+    cameras.request.size = ImageSize{160, 120};
+    config_.rig.cameras.push_back(cameras);
+    config_.rig.virtual_rig.time = rig::VirtualConfig::Time::real;
+    config_.rig.virtual_rig.scene = rig::VirtualConfig::Scene::flame;
+    config_.recording.folder = temp_ / "sessions";
+    config_.recording.writer = test::small_disk_options(session::Encoding::raw_nut);
+    config_.recording.transcode = rig::RecordingConfig::Transcode::never;
+    config_.reconstruction.program = EMBERLOCK_PROGRAM;
+    config_.reconstruction.device = "cpu";
+  }
+  void start() {
+    auto engine = daemon::Engine::start(config_, board_);
+    ASSERT_TRUE(engine.ok()) << engine.error().message();
+    engine_ = std::move(*engine);
+    ASSERT_TRUE(test::wait_until([&] { return board_.status()->phase() == v1::IDLE; }, kPatience));
+  }
+  static v1::RecordRequest take(const std::string& name, std::optional<v1::LiveRequest> live) {
+    v1::RecordRequest request;
+    request.set_name(name);
+    request.set_unlocked(true);
+    if (live) *request.mutable_live() = *live;
+    return request;
+  }
+  static v1::LiveRequest live(std::uint32_t every = 0, std::uint32_t voxels = 0) {
+    v1::LiveRequest request;
+    request.set_every(every);
+    request.set_voxels(voxels);
+    return request;
+  }
+  [[nodiscard]] State status() const { return board_.status()->live(); }
+  bool until(const std::function<bool(const State&)>& condition) {
+    return test::wait_until([&] { return condition(status()); }, kPatience);
+  }
+  /// Of ours, the process that makes volumes; 0: there is none.
+  static pid_t child() {
+    for (const auto& entry : fs::directory_iterator("/proc")) {
+      const int pid = std::atoi(entry.path().filename().c_str());
+      if (pid <= 0) continue;
+      std::ifstream in(entry.path() / "cmdline");
+      const std::string command((std::istreambuf_iterator<char>(in)), {});
+      std::ifstream stat(entry.path() / "stat");
+      std::string text;
+      std::getline(stat, text);
+      const auto bracket = text.rfind(") ");
+      if (bracket == std::string::npos || command.find("reconstruct-live") == std::string::npos) continue;
+      if (std::atoi(text.c_str() + bracket + 4) == ::getpid()) return pid;
+    }
+    return 0;
+  }
+  /// The recording's books agree, and volumes cost it nothing: they have ended where a frame was lost.
+  void expect_whole(const v1::RecordingStatus& recording) const {
+    EXPECT_EQ(recording.state(), v1::RecordingStatus::COMPLETE) << recording.verdict();
+    const v1::Counts& lost = recording.lost();
+    if (lost.queue() + lost.disk() > 0) EXPECT_EQ(status().state(), State::STOPPED) << recording.verdict();
+    auto reader = session::SessionReader::open(temp_ / ("sessions/" + recording.session()));
+    ASSERT_TRUE(reader.ok()) << reader.error().message();
+    std::uint64_t frames = 0;
+    for (std::size_t i = 0; i < reader->camera_count(); ++i) frames += reader->stamps(i).size();
+    EXPECT_EQ(frames, recording.frames());
+  }
+
+  test::TempFolder temp_;
+  rig::DaemonConfig config_;
+  daemon::Board board_;
+  std::unique_ptr<daemon::Engine> engine_;
+};
+
+TEST_F(LiveVolumesProgramTest, VolumesComeWhileItIsRecordedAndCostItNothing) {
+  start();
+  ASSERT_TRUE(engine_->record(take("without", {})).ok());
+  ASSERT_TRUE(test::wait_until([&] { return board_.status()->recording().frames() > 60; }, kPatience));
+  const auto without = engine_->stop_recording();
+  ASSERT_TRUE(without.ok());
+  expect_whole(*without);
+  EXPECT_FALSE(board_.status()->has_live());
+
+  const auto begun = engine_->record(take("with", live()));
+  ASSERT_TRUE(begun.ok()) << begun.error().message();
+  ASSERT_TRUE(until([](const State& now) { return now.volumes() >= 3; })) << status().ShortDebugString();
+  EXPECT_EQ(board_.status()->phase(), v1::CAPTURING) << "while it is recorded";
+  const State running = status();
+  EXPECT_EQ(running.session(), "with");
+  EXPECT_GT(running.delay_s(), 0);
+  EXPECT_GT(running.takes_s(), 0);
+  EXPECT_EQ(running.device(), "cpu");
+  EXPECT_TRUE(running.keeps_up());
+  const auto shown = board_.iterations(0);
+  ASSERT_EQ(shown.size(), 1U) << "the newest alone";
+  EXPECT_EQ(shown.back()->reconstruction(), "with live");
+  EXPECT_GT(shown.back()->volume().brightest(), 0);
+  const auto refused = engine_->reconstruct([] {
+    v1::ReconstructRequest request;
+    request.set_session("without");
+    return request;
+  }());
+  ASSERT_FALSE(refused.ok());
+  EXPECT_THAT(refused.error().message(), HasSubstr("live volumes have the machine"));
+  const auto with = engine_->stop_recording();
+  ASSERT_TRUE(with.ok());
+  expect_whole(*with);
+  EXPECT_EQ(status().state(), State::ENDED);
+  EXPECT_LT(status().frame(), with->frames());
+  EXPECT_TRUE(test::wait_until([] { return child() == 0; })) << "the process is gone";
+}
+
+TEST_F(LiveVolumesProgramTest, OneThatCannotKeepUpIsOvertakenAndSaysWhatWouldHold) {
+  start();
+  ASSERT_TRUE(engine_->record(take("quick", live(1, 64))).ok());
+  ASSERT_TRUE(until([](const State& now) { return now.volumes() >= 2 && !now.keeps_up(); }))
+      << status().ShortDebugString();
+  const State slow = status();
+  EXPECT_EQ(slow.voxels(), 64U);
+  EXPECT_GT(slow.skipped(), 0U);
+  EXPECT_GT(slow.holds_every(), 1U);
+  EXPECT_THAT(slow.reason(), HasSubstr("--every"));
+  const auto recorded = engine_->stop_recording();
+  ASSERT_TRUE(recorded.ok());
+  expect_whole(*recorded);
+}
+
+TEST_F(LiveVolumesProgramTest, AChildThatIsKilledIsToldAndTheRecordingGoesOn) {
+  start();
+  ASSERT_TRUE(engine_->record(take("take", live(2, 16))).ok());
+  ASSERT_TRUE(until([](const State& now) { return now.volumes() >= 1; })) << status().ShortDebugString();
+  const pid_t pid = child();
+  ASSERT_GT(pid, 0);
+  ASSERT_EQ(::kill(pid, SIGKILL), 0);
+  ASSERT_TRUE(until([](const State& now) { return now.state() == State::FAILED; }));
+  EXPECT_THAT(status().reason(), HasSubstr("was killed"));
+  const std::uint64_t then = board_.status()->recording().frames();
+  ASSERT_TRUE(test::wait_until([&] { return board_.status()->recording().frames() > then + 40; }, kPatience));
+  EXPECT_EQ(board_.status()->phase(), v1::CAPTURING);
+  const auto recorded = engine_->stop_recording();
+  ASSERT_TRUE(recorded.ok());
+  expect_whole(*recorded);
+}
+
+TEST_F(LiveVolumesProgramTest, WithoutACalibrationOrOutOfRangeNothingBegins) {
+  config_.rig.virtual_rig.scene = rig::VirtualConfig::Scene::dark_room;
+  start();
+  const auto refused = engine_->record(take("take", live()));
+  ASSERT_FALSE(refused.ok());
+  EXPECT_EQ(refused.error().kind, ErrorKind::bad_input);
+  EXPECT_THAT(refused.error().message(), HasSubstr("isn't calibrated"));
+  EXPECT_THAT(refused.error().message(), HasSubstr("emberlock calibrate cameras"));
+  const auto voxels = engine_->record(take("take", live(0, 5000)));
+  ASSERT_FALSE(voxels.ok());
+  EXPECT_THAT(voxels.error().message(), HasSubstr("live.voxels"));
+  EXPECT_FALSE(fs::exists(temp_ / "sessions/take"));
+  EXPECT_TRUE(engine_->record(take("take", {})).ok()) << "without them it is recorded";
+  EXPECT_TRUE(engine_->stop_recording().ok());
+}
+
+}  // namespace
+}  // namespace emberlock

@@ -36,9 +36,10 @@ struct LiveSentence {
                        it.times);
   }
   std::string operator()(const TooSlow& it) const {
-    return fmt::format("doesn't keep up: a volume of {} voxels takes {:.2f} s, and each {} frames are asked "
-                       "for. {} would hold",
-                       it.voxels, it.takes.value(), it.every, way_out(it));
+    return fmt::format(
+        "doesn't keep up: a volume of {} voxels takes {:.2f} s, and each {} frames are asked "
+        "for. {} would hold",
+        it.voxels, it.takes.value(), it.every, way_out(it));
   }
   std::string operator()(const LiveChildFailed& it) const {
     if (it.end.why == ChildEnd::Why::not_started) return it.end.words;
@@ -64,9 +65,11 @@ std::string live_notice(const std::string& why) {
 }
 
 Error not_calibrated(const std::string& camera) {
-  return {ErrorKind::bad_input, "isn't calibrated, so no volume can be made while it films", camera,
-          "Calibrate the rig (`emberlock calibrate cameras` writes a rig.json and beside it a transforms.json), name "
-          "that transforms.json as calibration in [rig] and restart emberlockd, or record without live volumes"};
+  return {
+      ErrorKind::bad_input, "isn't calibrated, so no volume can be made while it films", camera,
+      "Calibrate the rig (`emberlock calibrate cameras` writes a rig.json and beside it a transforms.json), "
+      "name "
+      "that transforms.json as calibration in [rig] and restart emberlockd, or record without live volumes"};
 }
 
 }  // namespace emberlock::daemon

@@ -43,9 +43,9 @@ Status check_live(const v1::LiveRequest& request) {
   if (request.every() > kMostEvery)
     return refuse_field("live.every", "is out of range", fmt::format("Give 1 to {}, or 0", kMostEvery));
   if (request.voxels() != 0 && (request.voxels() < kFewestVoxels || request.voxels() > kMostVoxels))
-    return refuse_field("live.voxels", "is out of range",
-                        fmt::format("Give {} to {}, or 0: as many as the machine holds", kFewestVoxels,
-                                    kMostVoxels));
+    return refuse_field(
+        "live.voxels", "is out of range",
+        fmt::format("Give {} to {}, or 0: as many as the machine holds", kFewestVoxels, kMostVoxels));
   return {};
 }
 

@@ -35,7 +35,7 @@ struct TooSlow {
   Seconds takes;  ///< a volume
   std::uint64_t every = 0;
   std::uint32_t voxels = 0;
-  std::uint64_t holds_every = 0;   ///< what would hold, as in v1::LiveStatus
+  std::uint64_t holds_every = 0;  ///< what would hold, as in v1::LiveStatus
   std::uint32_t holds_voxels = 0;
 };
 /// The process that makes them.
@@ -45,7 +45,7 @@ struct LiveChildFailed {
   std::string last_words;  ///< what it wrote to stderr
 };
 
-using LiveReason = std::variant<std::monostate, NoVolumeYet, QueueFills, DiskBehind, CamerasOverworked, FramesLostBeside,
-                                PausedTooOften, TooSlow, LiveChildFailed>;
+using LiveReason = std::variant<std::monostate, NoVolumeYet, QueueFills, DiskBehind, CamerasOverworked,
+                                FramesLostBeside, PausedTooOften, TooSlow, LiveChildFailed>;
 
 }  // namespace emberlock::daemon

@@ -37,7 +37,7 @@ class LiveState {
   v1::IterationPreview preview_of(v1::LiveFrame&& frame);
 
   v1::LiveStatus status_;
-  LiveReason reason_;  ///< of PAUSED, STOPPED, FAILED
+  LiveReason reason_;      ///< of PAUSED, STOPPED, FAILED
   std::string no_volume_;  ///< why the newest frame without one has none
   std::string told_;       ///< the failure that the child told itself
 };

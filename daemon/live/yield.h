@@ -12,10 +12,10 @@ namespace emberlock::daemon {
 
 /// How well a recording gets on.
 struct RecordingLoad {
-  double queue_fill = 0;   ///< 0..1, of the fullest queue
-  Seconds at_risk{0};      ///< for how long the oldest frame has waited to be on the disk
-  std::uint64_t lost = 0;  ///< frames, to too much work: for want of a buffer, to queue and disk
-  bool overworked = false; ///< some camera's thread computes for longer than it may
+  double queue_fill = 0;    ///< 0..1, of the fullest queue
+  Seconds at_risk{0};       ///< for how long the oldest frame has waited to be on the disk
+  std::uint64_t lost = 0;   ///< frames, to too much work: for want of a buffer, to queue and disk
+  bool overworked = false;  ///< some camera's thread computes for longer than it may
 };
 
 /// Decides whether volumes may be made beside a recording: they stand still as soon as it has trouble, long

@@ -16,20 +16,20 @@
 namespace emberlock::recon {
 
 struct LiveOptions {
-  std::uint64_t every = 0;            ///< as LivePace::every
-  std::optional<int> voxels = {};     ///< along the longest edge; else as many as the machine holds
+  std::uint64_t every = 0;         ///< as LivePace::every
+  std::optional<int> voxels = {};  ///< along the longest edge; else as many as the machine holds
   ComputeOptions compute;
-  std::function<bool()> stop = {};    ///< true: the volume at hand isn't wanted any more
+  std::function<bool()> stop = {};  ///< true: the volume at hand isn't wanted any more
 };
 
 /// What came of a frame.
 struct LiveVolume {
-  std::size_t frame = 0;  ///< the first camera's
-  TimePoint filmed;       ///< its arrival
-  Seconds took{0};        ///< from the disk to the volume
+  std::size_t frame = 0;      ///< the first camera's
+  TimePoint filmed;           ///< its arrival
+  Seconds took{0};            ///< from the disk to the volume
   std::uint64_t skipped = 0;  ///< as NewestFrames::skipped()
   int voxels = 0;
-  Seconds typical{0};     ///< that volumes of so many voxels take, lately
+  Seconds typical{0};  ///< that volumes of so many voxels take, lately
   LiveVerdict verdict;
   Result<Volume> volume;  ///< or why there is none: most often no flame is seen
 };
@@ -47,8 +47,8 @@ class LiveRun {
   /// `reader` follows the recording. The clock must outlive it.
   LiveRun(session::SessionReader reader, LiveOptions options, const Clock& clock);
 
-  /// So many frames of each camera are on the disk: of them the newest, if there is a newer one than the last.
-  /// Errors: those of SessionReader::advance().
+  /// So many frames of each camera are on the disk: of them the newest, if there is a newer one than the
+  /// last. Errors: those of SessionReader::advance().
   Result<std::optional<LiveVolume>> step(const std::vector<std::uint64_t>& safe);
 
  private:

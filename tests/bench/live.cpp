@@ -3,9 +3,9 @@
 // before a flame records twice, without and with them.
 //   bench_live --program build/release/libexec/emberlock/emberlock [--cameras 4] [--size 320x240] [--rate 24]
 //              [--seconds 10] [--every N] [--voxels V] [--device auto] [--encoding ffv1|raw] [--folder DIR]
-// Prints frames recorded and lost by cause, the fullest queue, the longest that a frame waited to be safe, and
-// of the volumes: how many, skipped frames, seconds a volume, delays, and by how much a delay was longer than
-// its volume took. Exits with 1 where the recording with them lost frames and the other did not.
+// Prints frames recorded and lost by cause, the fullest queue, the longest that a frame waited to be safe,
+// and of the volumes: how many, skipped frames, seconds a volume, delays, and by how much a delay was longer
+// than its volume took. Exits with 1 where the recording with them lost frames and the other did not.
 #include <algorithm>
 #include <chrono>
 #include <cstdio>
@@ -102,10 +102,11 @@ v1::RecordingStatus record(daemon::Engine& engine, daemon::Board& board, const A
   } while (status.session() != name || (status.state() != v1::RecordingStatus::COMPLETE &&
                                         status.state() != v1::RecordingStatus::FAILED));
   const v1::Counts& lost = status.lost();
-  std::printf("%-8s %6lu frames recorded, lost: %lu by cameras, %lu for want of a buffer, %lu to the queue, %lu "
-              "to the disk; fullest queue %.0f %%, longest until safe %.2f s. %s\n",
-              name.c_str(), lost.recorded(), lost.camera_gap() + lost.transport(), lost.underrun(),
-              lost.queue(), lost.disk(), 100 * fullest, at_risk, status.verdict().c_str());
+  std::printf(
+      "%-8s %6lu frames recorded, lost: %lu by cameras, %lu for want of a buffer, %lu to the queue, %lu "
+      "to the disk; fullest queue %.0f %%, longest until safe %.2f s. %s\n",
+      name.c_str(), lost.recorded(), lost.camera_gap() + lost.transport(), lost.underrun(), lost.queue(),
+      lost.disk(), 100 * fullest, at_risk, status.verdict().c_str());
   return status;
 }
 
@@ -142,10 +143,11 @@ void tell_volumes(const v1::LiveStatus& live, const std::vector<Shown>& shown) {
   std::printf("volumes  %lu on %s, %u voxels, %lu frames skipped, %lu without flame; %s %s\n", live.volumes(),
               live.device().c_str(), live.voxels(), live.skipped(), live.without_flame(),
               v1::LiveStatus::State_Name(live.state()).c_str(), live.reason().c_str());
-  std::printf("         seconds a volume: median %.2f, 95 %% %.2f, most %.2f; delay: median %.2f, 95 %% %.2f, "
-              "most %.2f s; delay beyond its volume's time: median %.2f, 95 %% %.2f, most %.2f s\n",
-              part(took, 0.5), part(took, 0.95), part(took, 1), part(delays, 0.5), part(delays, 0.95),
-              part(delays, 1), part(beyond, 0.5), part(beyond, 0.95), part(beyond, 1));
+  std::printf(
+      "         seconds a volume: median %.2f, 95 %% %.2f, most %.2f; delay: median %.2f, 95 %% %.2f, "
+      "most %.2f s; delay beyond its volume's time: median %.2f, 95 %% %.2f, most %.2f s\n",
+      part(took, 0.5), part(took, 0.95), part(took, 1), part(delays, 0.5), part(delays, 0.95),
+      part(delays, 1), part(beyond, 0.5), part(beyond, 0.95), part(beyond, 1));
 }
 
 }  // namespace

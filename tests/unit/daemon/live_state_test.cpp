@@ -1,7 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 // What a child's messages say of a recording's live volumes.
-#include "daemon/live/state.h"
-
 #include <csignal>
 #include <limits>
 #include <string>
@@ -10,6 +8,7 @@
 
 #include "daemon/engine/words.h"
 #include "daemon/live/live_volumes.h"
+#include "daemon/live/state.h"
 
 namespace emberlock::daemon {
 namespace {
@@ -101,8 +100,9 @@ TEST_F(LiveStateTest, OneThatDoesNotKeepUpSaysWhatWouldHold) {
   slow.mutable_live_frame()->set_holds_voxels(32);
   state_.take(std::move(slow), after(2));
   EXPECT_FALSE(state_.status().keeps_up());
-  EXPECT_EQ(words(state_.reason()), "doesn't keep up: a volume of 48 voxels takes 0.30 s, and each 6 frames "
-                                    "are asked for. --every 20 or --voxels 32 would hold");
+  EXPECT_EQ(words(state_.reason()),
+            "doesn't keep up: a volume of 48 voxels takes 0.30 s, and each 6 frames "
+            "are asked for. --every 20 or --voxels 32 would hold");
 }
 
 TEST_F(LiveStateTest, PausesAndGoesOn) {

@@ -39,7 +39,8 @@ class LiveVolumesTest : public testing::Test {
       volume.mutable_box()->add_size(1);
     }
     std::ofstream(root_ / "volume", std::ios::binary) << session::framed(message);
-    std::ofstream(root_ / "program") << "#!/bin/sh\nROOT='" << root_.path().string() << "'\n" << script << "\n";
+    std::ofstream(root_ / "program") << "#!/bin/sh\nROOT='" << root_.path().string() << "'\n"
+                                     << script << "\n";
     fs::permissions(root_ / "program", fs::perms::owner_all);
     LiveOptions options;
     options.program = root_ / "program";

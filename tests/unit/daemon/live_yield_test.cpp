@@ -1,13 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 // When live volumes give way to the recording.
-#include "daemon/live/yield.h"
-
 #include <variant>
 #include <vector>
 
 #include <gmock/gmock.h>
 
 #include "daemon/engine/words.h"
+#include "daemon/live/yield.h"
 
 namespace emberlock::daemon {
 namespace {

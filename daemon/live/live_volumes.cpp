@@ -179,20 +179,23 @@ ChildEnd LiveVolumes::watch(ChildProcess& child, const v1::LiveInput& session, s
     end.words = std::move(text);
     child.signal(SIGKILL);
   };
+  int messages = child.messages();  // -1: it has closed them
+  int errors = child.errors();
   const auto read_messages = [&] {
     Status parsed;
-    read_all(child.messages(), [&](std::string_view bytes) {
+    const ReadEnd at = read_all(messages, [&](std::string_view bytes) {
       heard = SteadyClock().now();
       if (parsed.ok())
         parsed = parser.add(bytes, [&](v1::ChildMessage&& message) { take(std::move(message)); });
     });
+    if (at == ReadEnd::closed || !parsed.ok()) messages = -1;
     if (!parsed.ok() && end.why == ChildEnd::Why::by_itself)
       condemn(ChildEnd::Why::unreadable, parsed.error().what);
   };
   for (;;) {
     pollfd polled[] = {{child.exited(), POLLIN, 0},
-                       {child.messages(), POLLIN, 0},
-                       {child.errors(), POLLIN, 0},
+                       {messages, POLLIN, 0},
+                       {errors, POLLIN, 0},
                        {woken_.get(), POLLIN, 0},
                        {unsent.empty() ? -1 : child.input(), POLLOUT, 0}};
     ::poll(polled, std::size(polled), kLook);
@@ -200,8 +203,9 @@ ChildEnd LiveVolumes::watch(ChildProcess& child, const v1::LiveInput& session, s
     if (ending_) child.signal(SIGKILL);
     std::uint64_t woken = 0;
     static_cast<void>(::read(woken_.get(), &woken, sizeof(woken)));
-    read_messages();
-    read_all(child.errors(), [&](std::string_view bytes) { words.add(bytes); });
+    if (messages >= 0) read_messages();
+    if (errors >= 0 && read_all(errors, [&](std::string_view bytes) { words.add(bytes); }) == ReadEnd::closed)
+      errors = -1;
     if (exited || ending_) break;
     // A child that stands still reads nothing: it is told the newest when it goes on.
     unsent += take_offer(child, yield, unsent.empty());

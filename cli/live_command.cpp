@@ -115,7 +115,7 @@ class LiveInputs {
   std::thread thread_;  // last: it uses all of the above
 };
 
-Result<recon::LiveOptions> options_of(const v1::LiveInput::Session& told) {
+Result<recon::LiveOptions> live_options(const v1::LiveInput::Session& told) {
   recon::LiveOptions options;
   options.every = told.request().every();
   if (told.request().voxels() > 0) options.voxels = static_cast<int>(told.request().voxels());
@@ -127,10 +127,10 @@ Result<recon::LiveOptions> options_of(const v1::LiveInput::Session& told) {
 }
 
 /// Until its input ends, or nobody reads any more.
-Status follow(ProgressStream& stream) try {
+Status follow_recording(ProgressStream& stream) try {
   LiveInputs inputs;
   EMBERLOCK_ASSIGN_OR_RETURN(const v1::LiveInput::Session told, inputs.session());
-  EMBERLOCK_ASSIGN_OR_RETURN(recon::LiveOptions options, options_of(told));
+  EMBERLOCK_ASSIGN_OR_RETURN(recon::LiveOptions options, live_options(told));
   options.stop = [&inputs] { return inputs.ended(); };
   stream.loading(options.compute.device);
   EMBERLOCK_ASSIGN_OR_RETURN(session::SessionReader reader, session::SessionReader::follow(told.folder()));
@@ -151,7 +151,7 @@ void run_live(int fd) {
   yield_to_all();
   auto stream = ProgressStream::open(fd);
   if (!stream) fail(stream.error());
-  if (const Status done = follow(*stream); !done.ok()) {
+  if (const Status done = follow_recording(*stream); !done.ok()) {
     stream->failed(done.error());
     fail(done.error());
   }

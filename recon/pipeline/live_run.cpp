@@ -14,7 +14,7 @@ constexpr double kShareOfMemory = 0.25;
 /// A box that was found at one instant is made so much larger.
 constexpr double kRoomToMove = 1.25;
 
-ReconstructOptions solve_options(const LiveOptions& live) {
+ReconstructOptions live_solve_options(const LiveOptions& live) {
   ReconstructOptions options;
   options.effects = parse_effects("none").value();
   options.solve.iterations = LiveRun::kPasses;
@@ -76,7 +76,7 @@ Result<Volume> LiveRun::reconstruct(std::size_t frame) {
   scene_.frame = frame;
   EMBERLOCK_ASSIGN_OR_RETURN(Scene scene, load_session(reader_, scene_, developers_));
   if (!scene_.box && !reader_.manifest().has_box()) scene.box.size *= kRoomToMove;
-  ReconstructOptions options = solve_options(options_);
+  ReconstructOptions options = live_solve_options(options_);
   if (!options_.voxels && !choice_)
     choice_.emplace(pace_.aim(), most_voxels(scene, options, kShareOfMemory * physical_memory()));
   if (!sequence_) {

@@ -21,7 +21,7 @@ namespace emberlock {
 namespace {
 namespace fs = std::filesystem;
 using testing::HasSubstr;
-using State = v1::LiveStatus;
+using Live = v1::LiveStatus;
 
 constexpr std::chrono::minutes kPatience{4};
 
@@ -60,21 +60,21 @@ class LiveVolumesProgramTest : public testing::Test {
     request.set_voxels(voxels);
     return request;
   }
-  [[nodiscard]] State status() const { return board_.status()->live(); }
-  bool until(const std::function<bool(const State&)>& condition) {
+  [[nodiscard]] Live status() const { return board_.status()->live(); }
+  bool until(const std::function<bool(const Live&)>& condition) {
     return test::wait_until([&] { return condition(status()); }, kPatience);
   }
   /// Records with live volumes until that holds, and goes on recording. Where the machine is so busy that
   /// they give way for good, again.
-  void record_until(const v1::LiveRequest& request, const std::function<bool(const State&)>& condition) {
+  void record_until(const v1::LiveRequest& request, const std::function<bool(const Live&)>& condition) {
     constexpr int kTries = 8;
     for (int i = 0; i < kTries; ++i) {
       const auto begun = engine_->record(take("take " + std::to_string(i), request));
       ASSERT_TRUE(begun.ok()) << begun.error().message();
-      ASSERT_TRUE(until([&](const State& now) {
-        return now.session() == begun->session() && (condition(now) || now.state() == State::STOPPED);
+      ASSERT_TRUE(until([&](const Live& now) {
+        return now.session() == begun->session() && (condition(now) || now.state() == Live::STOPPED);
       })) << status().ShortDebugString();
-      if (status().state() != State::STOPPED) return;
+      if (status().state() != Live::STOPPED) return;
       stop_recording();
     }
     FAIL() << status().ShortDebugString();
@@ -109,7 +109,7 @@ class LiveVolumesProgramTest : public testing::Test {
     EXPECT_EQ(recording.state(), v1::RecordingStatus::COMPLETE) << recording.verdict();
     const v1::Counts& lost = recording.lost();
     if (status().session() == recording.session() && lost.queue() + lost.disk() > 0)
-      EXPECT_NE(status().state(), State::ENDED) << "they have ended before: " << recording.verdict();
+      EXPECT_NE(status().state(), Live::ENDED) << "they have ended before: " << recording.verdict();
     auto reader = session::SessionReader::open(temp_ / ("sessions/" + recording.session()));
     ASSERT_TRUE(reader.ok()) << reader.error().message();
     EXPECT_GT(recording.frames(), 0U);
@@ -131,9 +131,9 @@ TEST_F(LiveVolumesProgramTest, VolumesComeWhileItIsRecordedAndCostItNothing) {
   EXPECT_FALSE(board_.status()->has_live());
   stop_recording();
 
-  record_until(live(), [](const State& now) { return now.volumes() >= 3; });
+  record_until(live(), [](const Live& now) { return now.volumes() >= 3; });
   EXPECT_EQ(board_.status()->phase(), v1::CAPTURING) << "while it is recorded";
-  const State running = status();
+  const Live running = status();
   EXPECT_GT(running.delay_s(), 0);
   EXPECT_GT(running.takes_s(), 0);
   EXPECT_EQ(running.device(), "cpu");
@@ -148,29 +148,29 @@ TEST_F(LiveVolumesProgramTest, VolumesComeWhileItIsRecordedAndCostItNothing) {
   ASSERT_FALSE(refused.ok());
   EXPECT_THAT(refused.error().message(), HasSubstr("live volumes have the machine"));
   const v1::RecordingStatus with = stop_recording();
-  EXPECT_TRUE(status().state() == State::ENDED || status().state() == State::STOPPED);
+  EXPECT_TRUE(status().state() == Live::ENDED || status().state() == Live::STOPPED);
   EXPECT_LT(status().frame(), with.frames());
   EXPECT_TRUE(test::wait_until([] { return child() == 0; })) << "the process is gone";
 }
 
 TEST_F(LiveVolumesProgramTest, OneThatCannotKeepUpIsOvertakenAndSaysWhatWouldHold) {
   start();
-  record_until(live(1, 64), [](const State& now) { return now.volumes() >= 2 && !now.keeps_up(); });
-  const State slow = status();
+  record_until(live(1, 64), [](const Live& now) { return now.volumes() >= 2 && !now.keeps_up(); });
+  const Live slow = status();
   EXPECT_EQ(slow.voxels(), 64U);
   EXPECT_GT(slow.skipped(), 0U);
   EXPECT_GT(slow.holds_every(), 1U);
-  if (slow.state() == State::RUNNING) EXPECT_THAT(slow.reason(), HasSubstr("--every"));
+  if (slow.state() == Live::RUNNING) EXPECT_THAT(slow.reason(), HasSubstr("--every"));
   stop_recording();
 }
 
 TEST_F(LiveVolumesProgramTest, AChildThatIsKilledIsToldAndTheRecordingGoesOn) {
   start();
-  record_until(live(2, 16), [](const State& now) { return now.volumes() >= 1; });
+  record_until(live(2, 16), [](const Live& now) { return now.volumes() >= 1; });
   const pid_t pid = child();
   ASSERT_GT(pid, 0);
   ASSERT_EQ(::kill(pid, SIGKILL), 0);
-  ASSERT_TRUE(until([](const State& now) { return now.state() == State::FAILED; }));
+  ASSERT_TRUE(until([](const Live& now) { return now.state() == Live::FAILED; }));
   EXPECT_THAT(status().reason(), HasSubstr("was killed"));
   const std::uint64_t then = board_.status()->recording().frames();
   ASSERT_TRUE(test::wait_until([&] { return board_.status()->recording().frames() > then + 40; }, kPatience));

@@ -18,7 +18,7 @@ namespace emberlock::daemon {
 namespace {
 namespace fs = std::filesystem;
 using testing::HasSubstr;
-using State = v1::LiveStatus;
+using Live = v1::LiveStatus;
 
 class LiveVolumesTest : public testing::Test {
  protected:
@@ -47,7 +47,7 @@ class LiveVolumesTest : public testing::Test {
     live_ = std::make_unique<LiveVolumes>(options, board_);
     live_->start(root_ / "take 1", {});
   }
-  bool reach(State::State state) {
+  bool reach(Live::State state) {
     return test::wait_until([&] { return live_->status()->state() == state; });
   }
   void offer(double fill = 0, std::uint64_t lost = 0) {
@@ -78,7 +78,7 @@ class LiveVolumesTest : public testing::Test {
 
 TEST_F(LiveVolumesTest, AVolumeIsShownWithItsDelay) {
   start("cat $ROOT/volume >&3; exec sleep 100");
-  ASSERT_TRUE(reach(State::RUNNING));
+  ASSERT_TRUE(reach(Live::RUNNING));
   const v1::LiveStatus status = *live_->status();
   EXPECT_EQ(status.session(), "take 1");
   EXPECT_EQ(status.frame(), 12U);
@@ -87,54 +87,54 @@ TEST_F(LiveVolumesTest, AVolumeIsShownWithItsDelay) {
   EXPECT_EQ(board_.iterations(0).back()->live_delay_s(), status.delay_s());
   live_->stop();
   EXPECT_FALSE(live_->runs());
-  EXPECT_EQ(live_->status()->state(), State::ENDED);
+  EXPECT_EQ(live_->status()->state(), Live::ENDED);
   EXPECT_TRUE(board_.notices(0).empty());
 }
 
 TEST_F(LiveVolumesTest, TheChildIsToldTheSessionFirstAndRunsAtTheLowestPriority) {
   start("nice > $ROOT/nice; head -c 3 > $ROOT/head; cat $ROOT/volume >&3; exec sleep 100");
-  ASSERT_TRUE(reach(State::RUNNING));
+  ASSERT_TRUE(reach(Live::RUNNING));
   EXPECT_EQ(test::bytes_of(root_ / "nice"), "19\n");
   EXPECT_EQ(test::bytes_of(root_ / "head").size(), 3U);
 }
 
 TEST_F(LiveVolumesTest, ItStandsStillWhileTheRecordingHasTroubleAndGoesOn) {
   start("echo $$ > $ROOT/pid.new; mv $ROOT/pid.new $ROOT/pid; cat $ROOT/volume >&3; exec sleep 100");
-  ASSERT_TRUE(reach(State::RUNNING));
+  ASSERT_TRUE(reach(Live::RUNNING));
   offer(0.6);
-  ASSERT_TRUE(reach(State::PAUSED));
+  ASSERT_TRUE(reach(Live::PAUSED));
   EXPECT_THAT(live_->status()->reason(), HasSubstr("goes first"));
   EXPECT_TRUE(test::wait_until([&] { return process_state() == "T"; }));
   EXPECT_TRUE(test::wait_until([&] {
     offer();
-    return live_->status()->state() == State::RUNNING;
+    return live_->status()->state() == Live::RUNNING;
   }));
   EXPECT_TRUE(test::wait_until([&] { return process_state() == "S"; }));
 }
 
 TEST_F(LiveVolumesTest, ItEndsWithAFrameThatTheRecordingLoses) {
   start("cat $ROOT/volume >&3; exec sleep 100");
-  ASSERT_TRUE(reach(State::RUNNING));
+  ASSERT_TRUE(reach(Live::RUNNING));
   offer(0, 1);
-  ASSERT_TRUE(reach(State::STOPPED));
+  ASSERT_TRUE(reach(Live::STOPPED));
   ASSERT_TRUE(test::wait_until([&] { return !board_.notices(0).empty(); }));
   EXPECT_THAT(board_.notices(0).back().text(), HasSubstr("goes on without live volumes"));
   EXPECT_THAT(board_.notices(0).back().text(), HasSubstr("lost 1 frame"));
-  EXPECT_EQ(live_->status()->state(), State::STOPPED);
+  EXPECT_EQ(live_->status()->state(), Live::STOPPED);
 }
 
 TEST_F(LiveVolumesTest, AChildThatDiesIsTold) {
   start("kill -9 $$");
-  ASSERT_TRUE(reach(State::FAILED));
+  ASSERT_TRUE(reach(Live::FAILED));
   EXPECT_THAT(live_->status()->reason(), HasSubstr("was killed"));
   ASSERT_TRUE(test::wait_until([&] { return !board_.notices(0).empty(); }));
   EXPECT_FALSE(live_->runs());
   start("echo nonsense >&2; exit 3");
-  ASSERT_TRUE(reach(State::FAILED));
+  ASSERT_TRUE(reach(Live::FAILED));
   EXPECT_THAT(live_->status()->reason(), HasSubstr("exit code 3"));
   EXPECT_THAT(live_->status()->reason(), HasSubstr("nonsense"));
   start("head -c 100 /dev/zero | tr '\\0' '\\377' >&3; exec sleep 100");
-  ASSERT_TRUE(reach(State::FAILED));
+  ASSERT_TRUE(reach(Live::FAILED));
   EXPECT_THAT(live_->status()->reason(), HasSubstr("can't be understood"));
 }
 
@@ -144,7 +144,7 @@ TEST_F(LiveVolumesTest, WithoutTheProgramThereAreNone) {
   live_ = std::make_unique<LiveVolumes>(options, board_);
   EXPECT_FALSE(live_->status());
   live_->start(root_ / "take 1", {});
-  ASSERT_TRUE(reach(State::FAILED));
+  ASSERT_TRUE(reach(Live::FAILED));
   EXPECT_THAT(live_->status()->reason(), HasSubstr("nowhere"));
 }
 

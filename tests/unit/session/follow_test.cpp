@@ -21,7 +21,7 @@ using test::small_disk_options;
 using test::TempFolder;
 using testing::HasSubstr;
 
-const ImageLayout kSmall{{32, 24}, PixelFormat::gray8, 8};
+const ImageLayout kFollowed{{32, 24}, PixelFormat::gray8, 8};
 
 /// A writer of one or more cameras, and a reader behind it.
 class Follow : public testing::TestWithParam<Encoding> {
@@ -30,7 +30,7 @@ class Follow : public testing::TestWithParam<Encoding> {
     WriterOptions options = small_disk_options(GetParam());
     options.frames_per_segment = frames_per_segment;
     auto writer =
-        SessionWriter::create(folder_, manifest_of(std::vector<ImageLayout>(cameras, kSmall)), options);
+        SessionWriter::create(folder_, manifest_of(std::vector<ImageLayout>(cameras, kFollowed)), options);
     ASSERT_TRUE(writer) << writer.error().message();
     writer_.emplace(std::move(*writer));
     auto reader = SessionReader::follow(folder_);
@@ -39,7 +39,7 @@ class Follow : public testing::TestWithParam<Encoding> {
   }
   void write(std::size_t camera, std::uint64_t first, std::uint64_t end) {
     for (std::uint64_t i = first; i < end; ++i)
-      ASSERT_TRUE(writer_->write(camera, noise_frame(kSmall, i, camera + 1)));
+      ASSERT_TRUE(writer_->write(camera, noise_frame(kFollowed, i, camera + 1)));
     ASSERT_TRUE(writer_->flush(camera));
   }
   /// What is safe, and no more.
@@ -51,8 +51,8 @@ class Follow : public testing::TestWithParam<Encoding> {
   void expect_frame(std::size_t camera, std::uint64_t i) {
     const auto frame = reader_->read(camera, i);
     ASSERT_TRUE(frame) << frame.error().message();
-    EXPECT_EQ(frame->stamp, noise_frame(kSmall, i, camera + 1).stamp);
-    EXPECT_EQ(frame->image->bytes(), noise_frame(kSmall, i, camera + 1).image->bytes());
+    EXPECT_EQ(frame->stamp, noise_frame(kFollowed, i, camera + 1).stamp);
+    EXPECT_EQ(frame->image->bytes(), noise_frame(kFollowed, i, camera + 1).image->bytes());
   }
 
   TempFolder temp_;
@@ -144,7 +144,7 @@ TEST_P(Follow, ADamagedRecordOfTheIndexIsAnError) {
 
 TEST(FollowOthers, AFinishedSessionIsNoneThatGrows) {
   const TempFolder temp;
-  test::record(temp / "s", kSmall, 3, small_disk_options());
+  test::record(temp / "s", kFollowed, 3, small_disk_options());
   auto reader = SessionReader::open(temp / "s");
   ASSERT_TRUE(reader);
   EXPECT_EQ(reader->advance({3}).error().kind, ErrorKind::bad_input);

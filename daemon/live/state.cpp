@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <utility>
 
 namespace emberlock::daemon {
@@ -42,8 +43,9 @@ std::optional<v1::IterationPreview> LiveState::take(v1::ChildMessage&& message, 
   if (status_.state() == v1::LiveStatus::STARTING) status_.set_state(v1::LiveStatus::RUNNING);
   status_.set_volumes(status_.volumes() + 1);
   status_.set_frame(frame.frame());
-  status_.set_filmed_ns(frame.filmed_ns());
-  status_.set_delay_s(std::max((now - TimePoint{frame.filmed_ns()}).value(), 0.0));
+  const std::int64_t filmed = std::max<std::int64_t>(frame.filmed_ns(), 0);
+  status_.set_filmed_ns(filmed);
+  status_.set_delay_s(std::max((now - TimePoint{filmed}).value(), 0.0));
   status_.set_voxels(frame.voxels());
   status_.set_takes_s(sound(frame.takes_s()));
   status_.set_keeps_up(frame.keeps_up());

@@ -85,8 +85,13 @@ const std::vector<FrameStamp>& SessionReader::stamps(std::size_t camera) const {
 }
 
 Result<Frame> SessionReader::read(std::size_t camera, std::size_t i) {
-  Result<Frame> frame = cameras_.at(camera)->read(i);
-  if (!frame && grows_) cameras_[camera]->close_segment();
+  CameraReader& reader = *cameras_.at(camera);
+  Result<Frame> frame = reader.read(i);
+  if (frame || !grows_ || i >= reader.stamps().size()) return frame;
+  // What was read ahead may end where the file ended then.
+  reader.close_segment();
+  frame = reader.read(i);
+  if (!frame) reader.close_segment();
   return frame;
 }
 

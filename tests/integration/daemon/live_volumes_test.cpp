@@ -108,8 +108,9 @@ class LiveVolumesProgramTest : public testing::Test {
   void expect_whole(const v1::RecordingStatus& recording) const {
     EXPECT_EQ(recording.state(), v1::RecordingStatus::COMPLETE) << recording.verdict();
     const v1::Counts& lost = recording.lost();
-    if (status().session() == recording.session() && lost.queue() + lost.disk() > 0)
+    if (status().session() == recording.session() && lost.queue() + lost.disk() > 0) {
       EXPECT_NE(status().state(), Live::ENDED) << "they have ended before: " << recording.verdict();
+    }
     auto reader = session::SessionReader::open(temp_ / ("sessions/" + recording.session()));
     ASSERT_TRUE(reader.ok()) << reader.error().message();
     EXPECT_GT(recording.frames(), 0U);
@@ -160,7 +161,9 @@ TEST_F(LiveVolumesProgramTest, OneThatCannotKeepUpIsOvertakenAndSaysWhatWouldHol
   EXPECT_EQ(slow.voxels(), 64U);
   EXPECT_GT(slow.skipped(), 0U);
   EXPECT_GT(slow.holds_every(), 1U);
-  if (slow.state() == Live::RUNNING) EXPECT_THAT(slow.reason(), HasSubstr("--every"));
+  if (slow.state() == Live::RUNNING) {
+    EXPECT_THAT(slow.reason(), HasSubstr("--every"));
+  }
   stop_recording();
 }
 

@@ -151,7 +151,9 @@ TEST(LiveVoxels, AreChosenOnceWhereTimeGrowsAsTheirNumber) {
     }
     EXPECT_LE(changes, 1) << at_32;
     const bool few = voxels.voxels() == kFewestLiveVoxels;
-    if (!few) EXPECT_LE(seconds_with(voxels.voxels(), at_32), 0.5) << at_32;
+    if (!few) {
+      EXPECT_LE(seconds_with(voxels.voxels(), at_32), 0.5) << at_32;
+    }
     if (few || voxels.voxels() == kMostLiveVoxels) continue;
     EXPECT_GT(seconds_with(voxels.voxels() + 8, at_32), 0.5) << at_32 << ": more would be too slow";
   }

@@ -29,6 +29,7 @@ void add_ar(CLI::App& app);
 void add_marker(CLI::App& app);
 /// What emberlockd starts for the flame in live pictures; not among the verbs of the help.
 void add_ar_live(CLI::App& app);
+void add_reconstruct_live(CLI::App& app);
 void add_export(CLI::App& app);
 void add_tradeoff(CLI::App& app);
 /// `evaluate paper`.

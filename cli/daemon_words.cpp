@@ -211,6 +211,32 @@ std::string recording_line(const v1::RecordingStatus& recording) {
                             bytes_in_words(recording.bytes_per_s()), 100 * recording.queue_fill());
 }
 
+std::string live_line(const v1::LiveStatus& live, std::int64_t now_ns) {
+  const bool runs = live.state() == v1::LiveStatus::RUNNING;
+  std::vector<std::string> parts;
+  if (!runs) parts.push_back(in_words(v1::LiveStatus::State_Name(live.state())));
+  if (live.has_frame()) {
+    const bool goes_on = runs || live.state() == v1::LiveStatus::PAUSED;
+    const double ago = 1e-9 * static_cast<double>(now_ns - live.filmed_ns());
+    parts.push_back(fmt::format("frame {}, {:.1f} s {}", live.frame(),
+                                std::max(goes_on ? ago : live.delay_s(), 0.0),
+                                goes_on ? "ago" : "after it was filmed"));
+    parts.push_back(fmt::format("{} voxels", live.voxels()));
+    parts.push_back(fmt::format("{:.2f} s a volume", live.takes_s()));
+  }
+  if (live.volumes() + live.skipped() > 0)
+    parts.push_back(fmt::format("{} shown, {} skipped", live.volumes(), live.skipped()));
+  if (!live.device().empty()) parts.push_back("on " + live.device());
+  std::string line = fmt::format("{}", fmt::join(parts, ", "));
+  return live.reason().empty() ? line : line + ". " + live.reason();
+}
+
+std::string live_preview_line(const v1::IterationPreview& preview) {
+  return fmt::format("{}: frame {}, {:.1f} s after it was filmed, {:.2f} s a volume",
+                     preview.reconstruction(), preview.frame(), preview.live_delay_s(),
+                     preview.iteration().seconds());
+}
+
 std::string iteration_line(const v1::Iteration& iteration) {
   std::string text = fmt::format("iteration {}: {:.1f} s, input error {:.2f}", iteration.iteration(),
                                  iteration.seconds(), iteration.input_rmse());
@@ -264,6 +290,7 @@ std::string status_screen(const v1::DaemonStatus& status) {
     add_line(text, "recording", recording_line(status.recording()));
     add_line(text, "", status.recording().verdict());
   }
+  if (status.has_live()) add_line(text, "live", live_line(status.live(), status.now_ns()));
   if (status.has_reconstruction()) add_line(text, "volume", reconstruction_line(status.reconstruction()));
   for (const v1::Job& job : status.jobs()) add_line(text, "job", job_line(job));
   if (!status.faults().empty()) text += "faults\n";

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <string>
 
+#include "emberlock/v1/services.pb.h"
 #include "emberlock/v1/status.pb.h"
 
 // The daemon's data as text for a terminal.
@@ -29,12 +30,17 @@ std::string lock_in_words(const v1::AlignmentStatus& alignment);
 std::string status_screen(const v1::DaemonStatus& status);
 /// "candle: 12 s, 3168 frames, none lost, 1.2 GB, 86.1 MB/s, queue 3 %".
 std::string recording_line(const v1::RecordingStatus& recording);
+/// Live volumes: "frame 120, 0.9 s ago: 64 voxels, 0.41 s a volume, 23 frames skipped, on cuda"; `now_ns` as
+/// in the status that they are of.
+std::string live_line(const v1::LiveStatus& live, std::int64_t now_ns);
 /// "salvage of take 1: 34 % done"; "compression of take 2: waits".
 std::string job_line(const v1::Job& job);
 /// Frames that a recording lost, by cause: "12 queue, 3 transport"; "none".
 std::string losses(const v1::Counts& counts);
 /// "iteration 3: 2.1 s, input error 5.31, held-out error 6.20 grey levels".
 std::string iteration_line(const v1::Iteration& iteration);
+/// "take 1 live: frame 120, 0.9 s after it was filmed, 0.41 s a volume".
+std::string live_preview_line(const v1::IterationPreview& preview);
 /// A frame of a sequence: "frame 12: done, input error 5.31, held-out error about 6.20 grey levels".
 std::string frame_line(const v1::SequenceFrame& frame);
 /// A round of alignment: one line, and one for each camera that is to be reset or isn't well.

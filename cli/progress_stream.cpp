@@ -64,9 +64,8 @@ void add_pictures(v1::IterationPreview& message, const recon::View& view,
   message.set_rendered_jpeg(jpeg(rendered));
 }
 
-void add_volume(v1::IterationPreview& message, const recon::Volume& volume) {
+void add_volume(v1::VolumePreview& preview, const recon::Volume& volume) {
   const recon::CoarseBrightness coarse = recon::coarse_brightness(volume, kBlocks);
-  v1::VolumePreview& preview = *message.mutable_volume();
   preview.set_nx(static_cast<std::uint32_t>(coarse.nx));
   preview.set_ny(static_cast<std::uint32_t>(coarse.ny));
   preview.set_nz(static_cast<std::uint32_t>(coarse.nz));
@@ -188,7 +187,7 @@ void ProgressStream::iteration(const recon::Preview& preview, const recon::Scene
     if (const std::optional<recon::Volume> volume = preview.recent()) {
       const recon::View& view = scene.views[shown_view(scene)];
       add_pictures(shown, view, rendered_small(*volume, preview, view, compute));
-      add_volume(shown, *volume);
+      add_volume(*shown.mutable_volume(), *volume);
       if (temperatures_) add_looked_up(shown, *volume, *temperatures_);
       pictures_due_ = begin + std::max<Clock::duration>(kRarely, kShare * (Clock::now() - begin));
     }
@@ -205,7 +204,7 @@ void ProgressStream::done(const recon::Outcome& outcome, const recon::Scene& sce
   const std::size_t v = shown_view(scene);
   const ImageSize size = recon::preview_size(scene.views[v].image->size, kWidest);
   add_pictures(shown, scene.views[v], recon::shrunk(outcome.renders[v], size));
-  add_volume(shown, outcome.reconstruction.volume);
+  add_volume(*shown.mutable_volume(), outcome.reconstruction.volume);
   add_measured(shown, outcome);
   send(last);
   written(report, folder);
@@ -222,7 +221,7 @@ void ProgressStream::stylized(const v1::StylizationStatus& status, const v1::Ite
   shown.set_camera_id(status.view());
   shown.set_captured_jpeg(jpeg(edited));
   shown.set_rendered_jpeg(jpeg(rendered));
-  if (volume != nullptr) add_volume(shown, *volume);
+  if (volume != nullptr) add_volume(*shown.mutable_volume(), *volume);
   send(message);
 }
 
@@ -259,6 +258,25 @@ void ProgressStream::failed(const Error& error) {
 void ProgressStream::ar_picture(v1::ArPicture picture) {
   v1::ChildMessage message;
   *message.mutable_ar_picture() = std::move(picture);
+  send(message);
+}
+
+void ProgressStream::live(const recon::LiveVolume& live) {
+  v1::ChildMessage message;
+  v1::LiveFrame& frame = *message.mutable_live_frame();
+  frame.set_frame(live.frame);
+  frame.set_filmed_ns(live.filmed.ns);
+  frame.set_seconds(live.took.value());
+  frame.set_skipped(live.skipped);
+  frame.set_voxels(static_cast<std::uint32_t>(live.voxels));
+  frame.set_takes_s(live.typical.value());
+  frame.set_keeps_up(live.verdict.keeps_up);
+  frame.set_holds_every(static_cast<std::uint32_t>(live.verdict.holds_every));
+  frame.set_holds_voxels(static_cast<std::uint32_t>(live.verdict.holds_voxels));
+  if (live.volume)
+    add_volume(*frame.mutable_volume(), *live.volume);
+  else
+    frame.set_failure(live.volume.error().message());
   send(message);
 }
 

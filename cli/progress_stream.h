@@ -10,6 +10,7 @@
 #include "base/result.h"
 #include "emberlock/v1/child.pb.h"
 #include "recon/export/temperature_look_up.h"
+#include "recon/pipeline/live_run.h"
 #include "recon/pipeline/reconstruct.h"
 
 namespace emberlock::cli {
@@ -41,6 +42,7 @@ class ProgressStream {
   /// done() without its pictures.
   void written(const recon::Report& report, const std::string& folder);
   void failed(const Error& error);
+  void live(const recon::LiveVolume& live);
   void ar_picture(v1::ArPicture picture);
   /// Nobody reads any more.
   [[nodiscard]] bool broken() const { return broken_; }

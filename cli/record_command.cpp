@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <chrono>
+#include <cstdint>
 #include <cstdio>
 #include <memory>
 #include <string>
@@ -19,6 +20,8 @@ struct RecordArguments {
   std::string name, purpose = "flame";
   double seconds = 0;
   bool unlocked = false, reconstruct = false, no_renewal = false, stop = false, json = false;
+  bool live = false;
+  std::uint32_t every = 0, voxels = 0;
 };
 
 bool is_over(const v1::RecordingStatus& recording) {
@@ -31,27 +34,28 @@ class Progressing {
  public:
   explicit Progressing(bool json) : json_(json) {}
 
-  void show(const v1::RecordingStatus& recording) {
+  void show(const v1::DaemonStatus& status) {
     const auto now = std::chrono::steady_clock::now();
     if (!json_ && !terminal_ && now < next_line_) return;
     next_line_ = now + std::chrono::seconds(1);
-    print(recording);
+    const bool live = status.live().session() == status.recording().session();
+    print(status.recording(), live ? "; live: " + live_line(status.live(), status.now_ns()) : "");
   }
   /// Exits with code 1 if the counts don't add up.
   void conclude(const v1::RecordingStatus& recording) const {
-    print(recording);
+    print(recording, "");
     if (!json_) std::printf("%s%s\n", terminal_ ? "\n" : "", recording.verdict().c_str());
     if (recording.state() == v1::RecordingStatus::FAILED) throw CLI::RuntimeError(1);
   }
 
  private:
-  void print(const v1::RecordingStatus& recording) const {
+  void print(const v1::RecordingStatus& recording, const std::string& more) const {
     if (json_) {
       std::printf("%s\n", json_line(recording).c_str());
     } else if (terminal_) {
-      std::printf("\r\033[K%s", recording_line(recording).c_str());
+      std::printf("\r\033[K%s%s", recording_line(recording).c_str(), more.c_str());
     } else {
-      std::printf("%s\n", recording_line(recording).c_str());
+      std::printf("%s%s\n", recording_line(recording).c_str(), more.c_str());
     }
     std::fflush(stdout);
   }
@@ -71,7 +75,7 @@ v1::RecordingStatus follow(Client& client, const std::string& session, Progressi
         if (recording.session() != session) return true;  // the previous one
         last = recording;
         if (is_over(recording)) return false;
-        progressing.show(recording);
+        progressing.show(status);
         return true;
       },
       Interrupt::asked);
@@ -122,6 +126,10 @@ void record(const RecordArguments& arguments) {
   request.set_seconds(arguments.seconds);
   request.set_unlocked(arguments.unlocked);
   request.set_reconstruct(arguments.reconstruct);
+  if (arguments.live) {
+    request.mutable_live()->set_every(arguments.every);
+    request.mutable_live()->set_voxels(arguments.voxels);
+  }
   if (arguments.seconds > 0 && !arguments.unlocked && !arguments.no_renewal)
     renew_for(client, arguments.seconds);
   const v1::RecordingStatus begun = or_leave(client, client.record(request));
@@ -146,6 +154,19 @@ void add_record(CLI::App& app) {
       ->needs(seconds);
   auto* reconstruct =
       verb->add_flag("--reconstruct", a.reconstruct, "Reconstruct the session when it is finished");
+  auto* live = verb->add_flag("--live", a.live,
+                              "Make volumes of the newest frames while it is recorded, for the console and "
+                              "`emberlock watch`, with what the recording leaves of the machine");
+  verb->add_option("--every", a.every,
+                   "With --live: of the first camera's frames each of so many alone [the newest, as often as "
+                   "the machine can]")
+      ->check(CLI::Range(1U, 1000000U))
+      ->needs(live);
+  verb->add_option("--voxels", a.voxels,
+                   "With --live: voxels along the longest edge [as many as the machine holds, by what the "
+                   "first volumes take]")
+      ->check(CLI::Range(8U, 1024U))
+      ->needs(live);
   auto* purpose = verb->add_option("--purpose", a.purpose,
                                    "Purpose of the recording; \"alignment\": of the flashing strobe")
                       ->capture_default_str();
@@ -153,6 +174,7 @@ void add_record(CLI::App& app) {
       ->excludes(seconds)
       ->excludes(unlocked)
       ->excludes(reconstruct)
+      ->excludes(live)
       ->excludes(purpose);
   verb->add_flag("--json", a.json, "RecordingStatus of emberlock/v1/status.proto, a line per change");
   verb->callback([arguments] { record(*arguments); });

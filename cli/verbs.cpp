@@ -30,6 +30,7 @@ int main(int argc, char** argv) {
   emberlock::cli::add_stylize(app);
   emberlock::cli::add_ar(app);
   emberlock::cli::add_ar_live(app);
+  emberlock::cli::add_reconstruct_live(app);
   emberlock::cli::add_marker(app);
   emberlock::cli::add_export(app);
   emberlock::cli::add_measure(app);

@@ -61,6 +61,7 @@ class Lines {
   }
   void show(v1::IterationPreview preview) {
     if (is_old(preview)) return;
+    if (!json_ && preview.has_live_delay_s()) return print(live_preview_line(preview));
     if (!json_) return print(preview.reconstruction() + " " + iteration_line(preview.iteration()));
     preview.clear_captured_jpeg();
     preview.clear_rendered_jpeg();
@@ -130,7 +131,7 @@ void add_watch(CLI::App& app) {
   auto arguments = std::make_shared<WatchArguments>();
   CLI::App* verb = app.add_subcommand("watch",
                                       "Follows the daemon from now until Ctrl-C: its states, its journal, "
-                                      "every iteration of a reconstruction");
+                                      "every iteration of a reconstruction, every live volume");
   add_daemon_options(*verb, arguments->daemon);
   verb->add_option("--seconds", arguments->seconds, "End after so many seconds")->check(CLI::PositiveNumber);
   verb->add_flag("--json", arguments->json,

@@ -42,6 +42,7 @@ void write_sentences(v1::DaemonStatus& status) {
   if (status.has_strobe()) mend(status.mutable_strobe()->mutable_reason());
   if (status.has_alignment()) mend(status.mutable_alignment()->mutable_reason());
   if (status.has_recording()) mend(status.mutable_recording()->mutable_verdict());
+  if (status.has_live() && !status.live().reason().empty()) mend(status.mutable_live()->mutable_reason());
   if (!status.has_reconstruction()) return;
   mend(status.mutable_reconstruction()->mutable_error());
   for (v1::SequenceFrame& frame : *status.mutable_reconstruction()->mutable_frames())

@@ -6,7 +6,12 @@
 #include <memory>
 #include <utility>
 
+#include <fcntl.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
 #include "base/file.h"
+#include "base/unique_fd.h"
 #include "session/files.h"
 
 namespace emberlock::session {
@@ -39,6 +44,28 @@ void list_segments(const fs::path& folder, const std::vector<IndexRecord>& recor
   }
 }
 
+namespace {
+
+/// The records of an index from number `first` up to before `end`; fewer bytes where it has fewer.
+Result<std::string> read_part(const fs::path& path, std::uint64_t first, std::uint64_t end) {
+  if (end > kMaxIndexBytes / kIndexRecordBytes)
+    return Error{ErrorKind::bad_input, "no recording has " + std::to_string(end) + " frames", path.string()};
+  const UniqueFd file(::open(path.c_str(), O_RDONLY | O_CLOEXEC));
+  if (!file) return errno_error(path, "cannot open");
+  struct stat info {};
+  if (::fstat(file.get(), &info) != 0) return errno_error(path, "cannot stat");
+  const std::uint64_t from = kIndexHeaderBytes + first * kIndexRecordBytes;
+  const std::uint64_t to =
+      std::min(static_cast<std::uint64_t>(info.st_size), kIndexHeaderBytes + end * kIndexRecordBytes);
+  std::string bytes(to > from ? to - from : 0, '\0');
+  if (::pread(file.get(), bytes.data(), bytes.size(), static_cast<off_t>(from)) !=
+      static_cast<ssize_t>(bytes.size()))
+    return errno_error(path, "cannot read");
+  return bytes;
+}
+
+}  // namespace
+
 CameraReader::CameraReader(fs::path folder, std::string camera_id, ImageLayout layout,
                            std::vector<IndexRecord> records)
     : folder_(std::move(folder)),
@@ -61,6 +88,25 @@ Status CameraReader::open_segment(std::uint32_t number) {
   }
   EMBERLOCK_ASSIGN_OR_RETURN(segment_, SegmentReader::open(path, layout_));
   number_ = number;
+  return {};
+}
+
+Status CameraReader::grow_to(std::uint64_t frames) {
+  if (frames <= records_.size()) return {};
+  const fs::path path = index_path(folder_, camera_id_);
+  EMBERLOCK_ASSIGN_OR_RETURN(const std::string bytes, read_part(path, records_.size(), frames));
+  EMBERLOCK_ASSIGN_OR_RETURN(ParsedIndex index, parse_index(encode_index_header() + bytes, path.string()));
+  const bool follows_on =
+      records_.empty() || index.records.empty() || follows(records_.back(), index.records.front());
+  if (!follows_on || records_.size() + index.records.size() != frames)
+    return Error{ErrorKind::bad_input,
+                 "the index has " + std::to_string(records_.size() + index.records.size()) +
+                     " good frames of the " + std::to_string(frames) + " that are said to be on the disk",
+                 path.string(), "Wait until the recording has ended; then verify it"};
+  for (const IndexRecord& record : index.records) {
+    records_.push_back(record);
+    stamps_.push_back(record.stamp);
+  }
   return {};
 }
 

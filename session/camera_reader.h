@@ -25,6 +25,11 @@ class CameraReader {
   [[nodiscard]] const std::vector<FrameStamp>& stamps() const { return stamps_; }
   [[nodiscard]] const std::vector<IndexRecord>& records() const { return records_; }
   Result<Frame> read(std::size_t i);
+  /// Takes the frames of a recording that goes on up to the first `frames`, which are on the disk. Errors:
+  /// bad_input (the index has fewer, or a damaged one), io.
+  Status grow_to(std::uint64_t frames);
+  /// The segment has grown since it was opened: the next read() opens it as it is by then.
+  void close_segment() { segment_.reset(); }
   /// Whether read(i) would succeed, as far as this can be told without decoding: SegmentReader::check.
   Status check(std::size_t i);
 

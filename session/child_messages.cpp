@@ -62,5 +62,6 @@ Status MessageParser<Message>::add(std::string_view bytes, const std::function<v
 
 template class MessageParser<v1::ChildMessage>;
 template class MessageParser<v1::EditRequest>;
+template class MessageParser<v1::LiveInput>;
 
 }  // namespace emberlock::session

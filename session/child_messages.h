@@ -32,7 +32,9 @@ class MessageParser {
 };
 using ChildMessageParser = MessageParser<v1::ChildMessage>;
 using EditRequestParser = MessageParser<v1::EditRequest>;
+using LiveInputParser = MessageParser<v1::LiveInput>;
 extern template class MessageParser<v1::ChildMessage>;
 extern template class MessageParser<v1::EditRequest>;
+extern template class MessageParser<v1::LiveInput>;
 
 }  // namespace emberlock::session

@@ -56,12 +56,43 @@ Result<SessionReader> SessionReader::open(const fs::path& folder) {
   return reader;
 }
 
+Result<SessionReader> SessionReader::follow(const fs::path& folder) {
+  EMBERLOCK_ASSIGN_OR_RETURN(v1::Manifest manifest, read_manifest(folder));
+  SessionReader reader(folder, std::move(manifest));
+  reader.grows_ = true;
+  for (const v1::CameraStream& camera : reader.manifest_.cameras()) {
+    EMBERLOCK_ASSIGN_OR_RETURN(const ImageLayout layout, layout_of(camera));
+    reader.cameras_.push_back(
+        std::make_unique<CameraReader>(folder, camera.camera_id(), layout, std::vector<IndexRecord>()));
+  }
+  return reader;
+}
+
+Status SessionReader::advance(const std::vector<std::uint64_t>& safe) {
+  if (!grows_ || safe.size() != cameras_.size())
+    return Error{ErrorKind::bad_input,
+                 "it is told of " + std::to_string(safe.size()) + " cameras, and follows " +
+                     std::to_string(grows_ ? cameras_.size() : 0),
+                 folder_.string()};
+  for (std::size_t i = 0; i < safe.size(); ++i) EMBERLOCK_RETURN_IF_ERROR(cameras_[i]->grow_to(safe[i]));
+  return {};
+}
+
 const ImageLayout& SessionReader::layout(std::size_t camera) const { return cameras_.at(camera)->layout(); }
 
 const std::vector<FrameStamp>& SessionReader::stamps(std::size_t camera) const {
   return cameras_.at(camera)->stamps();
 }
 
-Result<Frame> SessionReader::read(std::size_t camera, std::size_t i) { return cameras_.at(camera)->read(i); }
+Result<Frame> SessionReader::read(std::size_t camera, std::size_t i) {
+  CameraReader& reader = *cameras_.at(camera);
+  Result<Frame> frame = reader.read(i);
+  if (frame || !grows_ || i >= reader.stamps().size()) return frame;
+  // What was read ahead may end where the file ended then.
+  reader.close_segment();
+  frame = reader.read(i);
+  if (!frame) reader.close_segment();
+  return frame;
+}
 
 }  // namespace emberlock::session

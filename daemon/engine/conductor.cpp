@@ -66,6 +66,9 @@ Status Conductor::reconstruct(const v1::ReconstructRequest& request) {
   EMBERLOCK_RETURN_IF_ERROR(parts_.store.path_of(request.session()));
   EMBERLOCK_RETURN_IF_ERROR(check_not_salvaged(parts_.jobs, request.session()));
   EMBERLOCK_RETURN_IF_ERROR(parts_.reconstruction.check(request));
+  if (parts_.live.runs())
+    return Error{ErrorKind::refused, "live volumes have the machine", "the recording",
+                 "Ask again when it has ended"};
   reconstruct_request_ = request;
   return happen(AskReconstruct{request.session()});
 }

@@ -16,6 +16,7 @@
 #include "daemon/engine/overload_watch.h"
 #include "daemon/engine/recorder.h"
 #include "daemon/engine/words.h"
+#include "daemon/live/live_volumes.h"
 #include "daemon/reconstruction/child.h"
 #include "daemon/work/jobs.h"
 #include "daemon/work/upkeep.h"
@@ -34,6 +35,7 @@ struct ConductorParts {
   const rig::DaemonConfig& config;
   session::SessionStore& store;
   ReconstructionChild& reconstruction;
+  LiveVolumes& live;
   Jobs& jobs;  ///< those in the background stand still while something is recorded
   Board& board;
   UpkeepTold told = {};  ///< what became of a session in the background
@@ -103,6 +105,10 @@ class Conductor {
   void hold();
   void capture();
   void end_recording();
+  /// Whether live volumes can be made of what is recorded.
+  [[nodiscard]] Status check_live(const v1::LiveRequest& request) const;
+  /// Tells them how far the recording is.
+  void feed_live();
   [[nodiscard]] bool all_have_come() const;
   void drain();
   void note_trouble(std::size_t camera, const Error& error);
@@ -162,6 +168,8 @@ class Conductor {
   TimePoint record_ended_;
   std::optional<Seconds> spread_;  ///< between two cameras when it began, as the lock knew it
   std::optional<TimePoint> last_frame_;
+  std::vector<drivers::FrameCounts> counted_before_;  ///< the recording, by camera
+  std::optional<TimePoint> live_fed_;
   std::vector<bool> ended_;         ///< recordings that are replayed have ends
   std::vector<bool> trouble_told_;  ///< of a camera, since its last frame
   v1::ReconstructRequest reconstruct_request_;

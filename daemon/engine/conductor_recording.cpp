@@ -22,6 +22,7 @@ namespace {
 constexpr Seconds kNobodyFilms{10};
 constexpr Seconds kLongestWay{3};  // of frames that were filmed before a recording's end
 constexpr Seconds kDiskInterval{1};
+constexpr Seconds kLiveInterval{0.05};
 /// With fewer on the disk the operator is told.
 constexpr double kMinutesWanted = 5;
 /// How long one slice of work waits for what is being finished.
@@ -56,6 +57,7 @@ Status Conductor::record(const v1::RecordRequest& request) {
     return Error{ErrorKind::refused, "no camera films: " + words(silent), "emberlockd",
                  "See to the cameras: those that were lost are taken up again by themselves, and restarting "
                  "emberlockd begins a replay anew"};
+  if (request.has_live()) EMBERLOCK_RETURN_IF_ERROR(check_live(request.live()));
   const std::string name = folder.filename().string();
   const AskRecord ask{name, request.unlocked(), request.reconstruct(),
                       take_length(Seconds(request.seconds()))};
@@ -119,7 +121,37 @@ void Conductor::begin_recording() {
   }
   last_frame_.reset();
   expired_ = false;
+  counted_before_ = counts();
+  if (record_request_.has_live()) parts_.live.start(record_folder_, record_request_.live());
   static_cast<void>(happen(RecordingBegun{}));
+}
+
+Status Conductor::check_live(const v1::LiveRequest& request) const {
+  EMBERLOCK_RETURN_IF_ERROR(daemon::check_live(request));
+  if (!real_time())
+    return Error{ErrorKind::refused,
+                 "no volume can be made while simulated cameras film on a clock of their own",
+                 "[rig.virtual] time", "Set it to \"real\", or record without live volumes"};
+  for (const drivers::Camera* camera : devices_.cameras)
+    if (!parts_.geometry.calibration_of(camera->info().id)) return not_calibrated(camera->info().id);
+  if (!state_.reconstructing.empty())
+    return Error{ErrorKind::refused, "a reconstruction has the machine", state_.reconstructing,
+                 "Wait for it or cancel it, or record without live volumes"};
+  return {};
+}
+
+void Conductor::feed_live() {
+  const TimePoint now = SteadyClock().now();
+  if (!parts_.live.runs() || (live_fed_ && now - *live_fed_ < kLiveInterval)) return;
+  live_fed_ = now;
+  RecordedNow recorded = recorder_->now();
+  const std::vector<drivers::FrameCounts> counted = counts();
+  for (std::size_t i = 0; i < counted.size(); ++i) {
+    const drivers::FrameCounts made = counted[i] - counted_before_[i];
+    recorded.load.lost += made.underrun + made.queue;
+    recorded.load.overworked = recorded.load.overworked || parts_.rig.overworked(i);
+  }
+  parts_.live.offer(std::move(recorded.safe), recorded.load);
 }
 
 /// A locked rig's strobe flashes already; another's is set to once a frame, for the recording.
@@ -153,6 +185,7 @@ void Conductor::end_recording() {
   record_ended_ = parts_.rig.clock().now();
   if (seconds > 0) record_ended_ = std::min(record_ended_, record_began_ + Seconds(seconds));
   recorder_->end(record_ended_);
+  parts_.live.stop();
 }
 
 /// Whether each camera's frames until the recording's end have been taken, or needn't be waited for.
@@ -247,6 +280,7 @@ void Conductor::transcoded(const std::string& session, const JobResult& outcome)
 
 void Conductor::capture() {
   drain();
+  feed_live();
   const TimePoint now = parts_.rig.clock().now();
   const double seconds = record_request_.seconds();
   if (const auto failure = recorder_->failure()) {

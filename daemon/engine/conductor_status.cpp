@@ -135,6 +135,7 @@ v1::DaemonStatus Conductor::status() const {
   }
   if (const auto reconstruction = parts_.reconstruction.status())
     *status.mutable_reconstruction() = *reconstruction;
+  if (const auto live = parts_.live.status()) *status.mutable_live() = *live;
   *status.mutable_storage() = storage_;
   for (const v1::Job& job : parts_.jobs.list())
     if (!job.session().empty()) *status.add_jobs() = job;

@@ -51,6 +51,15 @@ LiveArOptions ar_options(const ReconstructionOptions& reconstruction) {
   return options;
 }
 
+LiveOptions live_options(const ReconstructionOptions& reconstruction) {
+  LiveOptions options;
+  options.program = reconstruction.program;
+  options.device = reconstruction.unasked.device();
+  options.threads = reconstruction.threads;
+  options.silence = reconstruction.silence;
+  return options;
+}
+
 }  // namespace
 
 Result<std::unique_ptr<Engine>> Engine::start(const rig::DaemonConfig& config, Board& board, OnFrame on_frame,
@@ -84,6 +93,7 @@ Engine::Engine(const rig::DaemonConfig& config, Board& board, session::SessionSt
       rig_(std::move(rig)),
       geometry_(std::move(geometry)),
       reconstruction_(reconstruction_options(config), board, jobs_),
+      live_(live_options(reconstruction_options(config)), board),
       ar_(std::move(ar)),
       thread_([this] { run(); }) {}
 
@@ -122,7 +132,7 @@ void Engine::run() {
   const auto went_round = [this] { went_round_ns_ = SteadyClock().now().ns; };
   went_round();  // cameras that hang take seconds each to start
   Conductor conductor(
-      {*rig_, geometry_, config_, store_, reconstruction_, jobs_, board_, told()},
+      {*rig_, geometry_, config_, store_, reconstruction_, live_, jobs_, board_, told()},
       [this, went_round] {
         went_round();
         return urgent_ > 0 || ending_;

@@ -102,6 +102,7 @@ class Engine final : public Api {
   std::unique_ptr<rig::Rig> rig_;
   rig::Geometry geometry_;
   ReconstructionChild reconstruction_;
+  LiveVolumes live_;
   std::shared_ptr<LiveAr> ar_;  ///< the cameras' threads have it too
 
   std::mutex mutex_;

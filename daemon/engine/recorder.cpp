@@ -126,6 +126,18 @@ std::uint64_t Recorder::no_room() const {
   return frames;
 }
 
+RecordedNow Recorder::now() const {
+  RecordedNow now;
+  for (std::size_t i = 0; i < books_.size(); ++i) {
+    const session::CameraProgress camera = writer_.progress(i);
+    now.safe.push_back(camera.safe);
+    now.load.queue_fill = std::max(now.load.queue_fill, camera.queue_fill);
+    now.load.at_risk = std::max(now.load.at_risk, camera.at_risk);
+    now.load.lost += camera.counts.queue() + camera.counts.disk();
+  }
+  return now;
+}
+
 void Recorder::show_progress(v1::RecordingStatus& status) const {
   v1::FrameProgress& all = *status.mutable_progress();
   status.clear_cameras();

@@ -12,6 +12,7 @@
 #include "base/frame.h"
 #include "base/progress.h"
 #include "base/result.h"
+#include "daemon/live/yield.h"
 #include "drivers/camera.h"
 #include "emberlock/v1/status.pb.h"
 #include "session/async_writer.h"
@@ -43,6 +44,12 @@ struct RecorderOptions {
   session::AsyncWriterOptions queue;
 };
 
+/// What of a recording is on the disk by now, and whether it has trouble.
+struct RecordedNow {
+  std::vector<std::uint64_t> safe;  ///< frames, by camera
+  RecordingLoad load;               ///< without what only the devices know
+};
+
 /// One recording in progress: frames in, a session's folder out, and the books on what became of each. One
 /// thread.
 class Recorder {
@@ -65,6 +72,7 @@ class Recorder {
   [[nodiscard]] std::optional<Error> failure() const { return writer_.failure(); }
   [[nodiscard]] v1::RecordingStatus status(TimePoint now) const;
   [[nodiscard]] session::WriterLoad load() const { return writer_.load(); }
+  [[nodiscard]] RecordedNow now() const;
   /// Frames for which its queues had no room.
   [[nodiscard]] std::uint64_t no_room() const;
 

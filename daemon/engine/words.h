@@ -10,6 +10,7 @@
 #include "base/result.h"
 #include "base/strobe_dial.h"
 #include "daemon/engine/reasons.h"
+#include "daemon/live/reasons.h"
 #include "emberlock/v1/status.pb.h"
 
 // All sentences that the engine says, made from its codes and numbers. Pure.
@@ -62,6 +63,12 @@ std::string words(const RateOff& rate);
 /// Of a strobe that somebody sets by hand, before the frames tell of it; without a rate while nothing is
 /// aligned.
 std::string words(const StrobeDial& dial, std::optional<Hertz> rate);
+/// Of live volumes: why they pause, ended or don't keep up; nothing where all is well.
+std::string words(const LiveReason& reason);
+/// The same for the journal, of what goes on without them.
+std::string live_notice(const std::string& why);
+/// Of a rig without calibration, of which they can't be made.
+Error not_calibrated(const std::string& camera);
 /// What of a session was saved, for the journal.
 std::string words(const std::string& session, const v1::SalvageReport& report);
 

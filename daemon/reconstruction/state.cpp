@@ -15,7 +15,13 @@
 namespace emberlock::daemon {
 namespace {
 
-/// Whether what is shown of an iteration holds together: it comes from another process.
+std::string signal_name(int signal) {
+  const char* const name = ::sigabbrev_np(signal);
+  return name == nullptr ? fmt::format("signal {}", signal) : fmt::format("SIG{}", name);
+}
+
+}  // namespace
+
 bool is_sound(const v1::VolumePreview& volume) {
   constexpr std::uint32_t kMost = 256;  // along an edge
   const std::size_t size = volume.voxels().size();
@@ -26,13 +32,6 @@ bool is_sound(const v1::VolumePreview& volume) {
            return layer.voxels().size() == size && std::isfinite(layer.low()) && std::isfinite(layer.high());
          });
 }
-
-std::string signal_name(int signal) {
-  const char* const name = ::sigabbrev_np(signal);
-  return name == nullptr ? fmt::format("signal {}", signal) : fmt::format("SIG{}", name);
-}
-
-}  // namespace
 
 ReconstructionState::ReconstructionState(v1::ReconstructionStatus begun) : status_(std::move(begun)) {
   status_.set_state(v1::ReconstructionStatus::RUNNING);

@@ -27,6 +27,9 @@ struct ChildEnd {
   std::string words = {};  ///< of `silent`, `unreadable` and `not_started`
 };
 
+/// Whether what is shown of a volume holds together: it comes from another process.
+bool is_sound(const v1::VolumePreview& volume);
+
 /// What a reconstruction's messages and end say of it: pure.
 class ReconstructionState {
  public:

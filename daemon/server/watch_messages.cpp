@@ -54,6 +54,7 @@ std::vector<WatchMessage> watch_messages(const v1::IterationPreview& preview) {
   numbers.set_camera_id(preview.camera_id());
   if (preview.has_frame()) numbers.set_frame(preview.frame());
   *numbers.mutable_iteration() = preview.iteration();
+  if (preview.has_live_delay_s()) numbers.set_live_delay_s(preview.live_delay_s());
   if (preview.has_stylization()) *numbers.mutable_stylization() = preview.stylization();
   std::vector<WatchMessage> messages{text_of("iteration", numbers)};
   const auto header = [&](const char* kind) {

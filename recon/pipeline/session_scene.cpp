@@ -293,12 +293,11 @@ Status check_between(const session::SessionReader& reader, const std::optional<v
 struct Filmed {
   View view;
   std::vector<PreprocessStep> steps;
-  std::optional<FrameDeveloper> developer;
 };
 
 Result<Filmed> view_of(session::SessionReader& reader, std::size_t i, const v1::CameraStream& stream,
                        const Instant& instant, const std::optional<v1::ShutterTimes>& times,
-                       const SceneOptions& options) {
+                       const SceneOptions& options, std::optional<FrameDeveloper>& developer) {
   Filmed filmed;
   View& view = filmed.view;
   view.name = stream.camera_id();
@@ -329,9 +328,11 @@ Result<Filmed> view_of(session::SessionReader& reader, std::size_t i, const v1::
         "recording's first and last frame, and those beside lost ones"};
   }
   EMBERLOCK_ASSIGN_OR_RETURN(const Frame shown, reader.read(i, *nearest));
-  EMBERLOCK_ASSIGN_OR_RETURN(filmed.developer,
-                             FrameDeveloper::create(reader, i, stream, shown, *nearest, options.frames));
-  DevelopedPicture picture = filmed.developer->develop(shown);
+  if (!developer) {
+    EMBERLOCK_ASSIGN_OR_RETURN(developer,
+                               FrameDeveloper::create(reader, i, stream, shown, *nearest, options.frames));
+  }
+  DevelopedPicture picture = developer->develop(shown);
   view.image = share(std::move(picture.image));
   if (!picture.bounds.empty()) view.bounds = share(std::move(picture.bounds));
   filmed.steps = std::move(picture.steps);
@@ -362,6 +363,13 @@ std::vector<std::optional<FilmedFrame>> filmed_frames(const session::SessionRead
 
 Result<Scene> load_session(const fs::path& folder, const SceneOptions& options) {
   EMBERLOCK_ASSIGN_OR_RETURN(session::SessionReader reader, session::SessionReader::open(folder));
+  KeptDevelopers developers;
+  return load_session(reader, options, developers);
+}
+
+Result<Scene> load_session(session::SessionReader& reader, const SceneOptions& options,
+                           KeptDevelopers& kept) {
+  const fs::path& folder = reader.folder();
   v1::Manifest manifest = reader.manifest();
   const std::string manifest_name = (folder / "manifest.json").string();
   if (options.rig) {
@@ -390,9 +398,10 @@ Result<Scene> load_session(const fs::path& folder, const SceneOptions& options) 
   const Instant instant = instant_of(reader, frame, options.part);
   if (options.part) EMBERLOCK_RETURN_IF_ERROR(check_between(reader, times, instant));
   std::vector<Filmed> cameras(reader.camera_count());
+  kept.resize(reader.camera_count());
   EMBERLOCK_RETURN_IF_ERROR(each_camera(reader, options.threads, [&](std::size_t i) -> Status {
-    EMBERLOCK_ASSIGN_OR_RETURN(
-        cameras[i], view_of(reader, i, manifest.cameras(static_cast<int>(i)), instant, times, options));
+    EMBERLOCK_ASSIGN_OR_RETURN(cameras[i], view_of(reader, i, manifest.cameras(static_cast<int>(i)), instant,
+                                                   times, options, kept[i]));
     return {};
   }));
   Scene scene;
@@ -402,12 +411,13 @@ Result<Scene> load_session(const fs::path& folder, const SceneOptions& options) 
   Recording recording{reader, manifest, options, {}};
   std::vector<std::pair<std::string, std::vector<PreprocessStep>>> steps;
   steps.reserve(cameras.size());
-  for (Filmed& camera : cameras) {
-    scene.linearised = scene.linearised || camera.developer->linearises();
-    steps.emplace_back(camera.view.name, std::move(camera.steps));
-    scene.views.push_back(std::move(camera.view));
-    if (frame == middle_frame(reader)) recording.developers.push_back(std::move(*camera.developer));
+  for (std::size_t i = 0; i < cameras.size(); ++i) {
+    scene.linearised = scene.linearised || kept[i]->linearises();
+    steps.emplace_back(cameras[i].view.name, std::move(cameras[i].steps));
+    scene.views.push_back(std::move(cameras[i].view));
   }
+  if (frame == middle_frame(reader))
+    for (const std::optional<FrameDeveloper>& developer : kept) recording.developers.push_back(*developer);
   scene.preprocessing = together(steps);
   const auto shared = options.recording ? options.recording : std::make_shared<SharedRecording>();
   if (box)

@@ -5,16 +5,20 @@
 #include <string_view>
 #include <utility>
 
+#include "daemon/live/state.h"
 #include "daemon/reconstruction/state.h"
 #include "session/child_messages.h"
 
-// What a reconstruction's child sends the daemon, in two pieces.
+// What a reconstruction's child, or that of live volumes, sends the daemon, in two pieces.
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   using namespace emberlock;
   const std::string_view bytes(reinterpret_cast<const char*>(data), size);
   daemon::ReconstructionState state{v1::ReconstructionStatus()};
+  daemon::LiveState live("session", {});
   const auto take = [&](v1::ChildMessage&& message) {
-    const auto shown = state.take(std::move(message));
+    const bool of_live = message.has_live_frame();
+    const auto shown = of_live ? live.take(std::move(message), {}) : state.take(std::move(message));
+    if (!(live.status().takes_s() >= 0 && live.status().delay_s() >= 0)) std::abort();
     if (!shown || !shown->has_volume()) return;
     const v1::VolumePreview& volume = shown->volume();
     if (volume.voxels().size() != std::size_t{volume.nx()} * volume.ny() * volume.nz()) std::abort();

@@ -39,8 +39,9 @@ struct SmallDaemon {
         rig(rig::Rig::open(config.rig, std::move(options)).value()),
         geometry(rig::Geometry::of(config.rig, *rig).value()),
         reconstruction({}, board, jobs),
+        live({.program = "no program"}, board),
         conductor(std::in_place,
-                  daemon::ConductorParts{*rig, geometry, config, store, reconstruction, jobs, board},
+                  daemon::ConductorParts{*rig, geometry, config, store, reconstruction, live, jobs, board},
                   std::move(stop)) {}
 
   /// Works until `done`, or for so many slices.
@@ -64,6 +65,7 @@ struct SmallDaemon {
   std::unique_ptr<rig::Rig> rig;
   rig::Geometry geometry;
   daemon::ReconstructionChild reconstruction;
+  daemon::LiveVolumes live;
   daemon::Jobs jobs;
   std::optional<daemon::Conductor> conductor;
   v1::DaemonStatus status;

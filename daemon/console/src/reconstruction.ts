@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 // A reconstruction as it runs: captured beside rendered after every iteration, error against time, the volume.
-import type {DaemonStatus, Iteration, IterationPreview, Light, ReconstructionStatus} from './api.gen';
+import type {DaemonStatus, Iteration, IterationPreview, Light, LiveStatus, ReconstructionStatus} from './api.gen';
 import {act, TwoStep} from './act';
 import {el, set, setText, show} from './dom';
 import {fixed, known, percent, span} from './format';
 import {Layers} from './layers';
 import {showSign, Sign} from './light';
+import {films, LiveLine} from './live_volumes';
 import {bitmapOf, isGrey, paint} from './picture';
 import {Player} from './player';
 import {Plot} from './plot';
@@ -39,6 +40,7 @@ export class Reconstruction {
   private readonly layers = new Layers(() => { if (this.drawn) void this.draw(...this.drawn); });
   private readonly sequence = new Sequence();
   private readonly player = new Player((volume, voxels) => void this.draw(volume, voxels), () => { if (this.live) void this.draw(...this.live); });
+  private readonly liveLine = new LiveLine();
   private readonly temperature = el('ul', {class: 'reasons'});
   private readonly effects = el('ul', {class: 'reasons'});
   private readonly advice = el('ul', {class: 'reasons'});
@@ -58,13 +60,14 @@ export class Reconstruction {
   private viewsAsked = 0;
   private readonly newest = {captured: 0, rendered: 0};
   private grey = false;
+  private ofRecording = false;  // what is shown is of a recording that goes on, or the newest was
   readonly root: HTMLElement;
 
   constructor() {
     this.content = el('div', {class: 'reconstruction', hidden: true},
       el('div', {class: 'pair'}, el('figure', {}, this.views.captured, this.captions.captured), el('figure', {}, this.views.rendered, this.captions.rendered)),
       el('div', {class: 'progress'}, this.sequence.root, this.latest, this.plot.root, this.measured, this.chosen, this.advised, this.result),
-      el('div', {class: 'turn'}, this.place, this.player.root, this.volumeNote, this.layers.root));
+      el('div', {class: 'turn'}, this.liveLine.root, this.place, this.player.root, this.volumeNote, this.layers.root));
     this.place.addEventListener('keydown', event => {
       const by = {ArrowLeft: [-10, 0], ArrowRight: [10, 0], ArrowUp: [0, 10], ArrowDown: [0, -10]}[event.key];
       if (by === undefined || !this.volume) return;
@@ -77,10 +80,16 @@ export class Reconstruction {
   }
 
   show(status: DaemonStatus): void {
-    const r = status.reconstruction;
-    show(this.none, !r);
-    show(this.content, r !== undefined);
-    for (const part of [this.bar, this.cancel, this.sign.root]) show(part, r !== undefined);
+    const {live, reconstruction: r} = status;
+    if (films(status)) this.ofRecording = true;
+    else if (r?.state === 'RUNNING') this.ofRecording = false;
+    const shown = (this.ofRecording ? live : r) !== undefined;
+    show(this.none, !shown);
+    show(this.content, shown);
+    set(this.content, 'data-live', this.ofRecording);
+    show(this.liveLine.root, this.ofRecording);
+    for (const part of [this.bar, this.cancel, this.sign.root]) show(part, shown);
+    if (this.ofRecording && live) return this.showLive(status, live);
     if (!r) return;
     this.begin(r.id, frameAtHand(r));
     const part = r.state === 'FAILED' && r.frames.some(({state}) => state === 'DONE');
@@ -104,7 +113,15 @@ export class Reconstruction {
     setText(this.result, r.result ? `Written to ${r.result}` : '');
   }
 
+  private showLive(status: DaemonStatus, live: LiveStatus): void {
+    this.liveLine.show(status, live, this.sign, this.word);
+    for (const part of [this.bar, this.cancel, this.error]) show(part, false);
+    setText(this.doing, live.session);
+  }
+
   preview(preview: IterationPreview): void {
+    this.ofRecording = known(preview.live_delay_s);
+    if (this.ofRecording) return this.begin(preview.reconstruction, undefined);
     this.begin(preview.reconstruction, preview.frame);
     const {iteration} = preview;
     if (iteration && iteration.iteration > (this.iterations.at(-1)?.iteration ?? -1)) this.showIterations([...this.iterations, iteration]);
@@ -131,7 +148,7 @@ export class Reconstruction {
 
   showVolume(header: Volume, voxels: Uint8Array): void {
     this.live = [header, voxels];
-    if (this.player.follows) void this.draw(header, voxels);
+    if (this.ofRecording || this.player.follows) void this.draw(header, voxels);
   }
 
   private async draw(header: Volume, voxels: Uint8Array): Promise<void> {

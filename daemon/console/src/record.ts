@@ -4,6 +4,7 @@ import type {Counts, DaemonStatus, RecordingStatus} from './api.gen';
 import {act, TwoStep} from './act';
 import {el, set, setText, show} from './dom';
 import {bytes, clock, count, fixed, known, percent, short, span} from './format';
+import {LiveChoice} from './live_volumes';
 import {call} from './wire';
 
 const causes: [keyof Counts, string][] = [
@@ -48,6 +49,7 @@ export class Record {
   private readonly purpose = el('select', {name: 'purpose'}, el('option', {value: 'flame'}, 'flame'), el('option', {value: 'alignment'}, 'alignment'));
   private readonly seconds = el('input', {name: 'seconds', type: 'number', min: 0, step: 'any', placeholder: 'until stopped', inputmode: 'decimal'});
   private readonly reconstruct = el('input', {name: 'reconstruct', type: 'checkbox'});
+  private readonly live = new LiveChoice();
   private readonly step = new TwoStep(this.button, armed => this.words(armed), () => this.go());
   private status?: DaemonStatus;
   private waiting = false;
@@ -61,9 +63,9 @@ export class Record {
       el('h2', {id: 'record-title', class: 'hidden'}, 'Recording'),
       el('div', {class: 'record-line'}, this.button, el('div', {}, this.time, this.session)), this.hint,
       this.disk, this.numbers, el('div', {class: 'queue'}, el('span', {}, 'queue'), this.queue, this.queueWords), this.drops, this.verdict,
-      el('details', {}, el('summary', {}, 'Name and length'),
+      el('details', {}, el('summary', {}, 'Name and length, live volumes'),
         el('div', {class: 'options'}, option('Name', this.name), option('Of', this.purpose), option('Seconds', this.seconds),
-          option('Reconstruct it afterwards', this.reconstruct))));
+          option('Reconstruct it afterwards', this.reconstruct), ...this.live.options)));
   }
 
   /** By key everything takes two presses. By the button a start takes one when the cameras are locked; all else two. */
@@ -147,6 +149,8 @@ export class Record {
       this.name.reportValidity();
       return;
     }
+    const live = this.live.request();
+    if (!stop && !live) return;
     this.waiting = true;
     this.button.disabled = true;
     this.step.show();
@@ -167,6 +171,7 @@ export class Record {
       seconds,
       unlocked: this.status?.phase !== 'LOCKED',
       reconstruct: this.reconstruct.checked,
+      ...live,
     })).then(answer => {
       this.waiting = false;
       if (answer && !stop) this.name.value = '';

@@ -16,6 +16,7 @@
 #include "base/clock.h"
 #include "cli/client.h"
 #include "cli/commands.h"
+#include "cli/daemon_words.h"
 #include "daemon/server/grpc_server.h"
 #include "tests/support/fake_api.h"
 #include "tests/support/recording.h"
@@ -292,6 +293,56 @@ TEST_F(DaemonVerbs, RecordFollowsToTheVerdict) {
   EXPECT_THAT(api_.calls().front(), HasSubstr("name: \"candle\""));
   EXPECT_THAT(api_.calls().front(), HasSubstr("seconds: 2"));
   EXPECT_THAT(api_.calls().front(), HasSubstr("reconstruct: true"));
+}
+
+TEST_F(DaemonVerbs, LiveVolumesAreAskedForWithTheRecordingAndToldBesideIt) {
+  v1::RecordRequest asked;
+  api_.on_record = [&](const v1::RecordRequest& request) {
+    asked = request;
+    v1::DaemonStatus running = recording(v1::RecordingStatus::RECORDING, 240);
+    running.set_now_ns(5'000'000'000);
+    v1::LiveStatus& live = *running.mutable_live();
+    live.set_session("candle");
+    live.set_state(v1::LiveStatus::RUNNING);
+    live.set_frame(120);
+    live.set_filmed_ns(4'100'000'000);
+    live.set_takes_s(0.41);
+    live.set_voxels(48);
+    live.set_volumes(11);
+    live.set_skipped(109);
+    live.set_device("cuda");
+    show_soon({running, recording(v1::RecordingStatus::COMPLETE, 480)});
+    return Result<v1::RecordingStatus>(recording(v1::RecordingStatus::RECORDING, 0).recording());
+  };
+  const test::VerbRun result =
+      run(add_record, {"record", "candle", "--live", "--every", "12", "--voxels", "48"});
+  EXPECT_EQ(result.code, 0) << result.err;
+  EXPECT_EQ(asked.live().every(), 12U);
+  EXPECT_EQ(asked.live().voxels(), 48U);
+  EXPECT_THAT(result.out, HasSubstr("; live: frame 120, 0.9 s ago, 48 voxels, 0.41 s a volume, 11 shown, 109 "
+                                    "skipped, on cuda"));
+  EXPECT_NE(run(add_record, {"record", "candle", "--every", "12"}).code, 0) << "without --live";
+}
+
+TEST(LiveWords, SayWhatIsShownAndWhyNothingIs) {
+  v1::LiveStatus live;
+  live.set_state(v1::LiveStatus::STARTING);
+  EXPECT_EQ(live_line(live, 0), "starting");
+  live.set_state(v1::LiveStatus::ENDED);
+  live.set_frame(7);
+  live.set_delay_s(0.5);
+  live.set_voxels(32);
+  live.set_takes_s(0.25);
+  EXPECT_EQ(live_line(live, 0), "ended, frame 7, 0.5 s after it was filmed, 32 voxels, 0.25 s a volume");
+  live.set_state(v1::LiveStatus::STOPPED);
+  live.set_reason("Stopped.");
+  EXPECT_THAT(live_line(live, 0), testing::EndsWith(". Stopped."));
+  v1::IterationPreview preview;
+  preview.set_reconstruction("take 1 live");
+  preview.set_frame(120);
+  preview.set_live_delay_s(0.9);
+  preview.mutable_iteration()->set_seconds(0.41);
+  EXPECT_EQ(live_preview_line(preview), "take 1 live: frame 120, 0.9 s after it was filmed, 0.41 s a volume");
 }
 
 TEST_F(DaemonVerbs, ARecordingWhoseCountsDoNotAgreeIsAFailure) {

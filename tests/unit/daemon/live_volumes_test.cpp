@@ -1,0 +1,152 @@
+// SPDX-License-Identifier: Apache-2.0
+// Live volumes' child process, played by a shell script.
+#include "daemon/live/live_volumes.h"
+
+#include <filesystem>
+#include <fstream>
+#include <memory>
+#include <string>
+
+#include <gmock/gmock.h>
+
+#include "base/clock.h"
+#include "session/child_messages.h"
+#include "tests/support/recording.h"
+#include "tests/support/wait.h"
+
+namespace emberlock::daemon {
+namespace {
+namespace fs = std::filesystem;
+using testing::HasSubstr;
+using Live = v1::LiveStatus;
+
+class LiveVolumesTest : public testing::Test {
+ protected:
+  /// With ROOT for the folder; `cat ROOT/volume >&3` sends a volume.
+  void start(const std::string& script) {
+    v1::ChildMessage message;
+    v1::LiveFrame& live = *message.mutable_live_frame();
+    live.set_frame(12);
+    live.set_filmed_ns((SteadyClock().now() - Seconds(0.5)).ns);
+    live.set_keeps_up(true);
+    v1::VolumePreview& volume = *live.mutable_volume();
+    volume.set_nx(1);
+    volume.set_ny(1);
+    volume.set_nz(1);
+    volume.set_voxels("a");
+    for (int i = 0; i < 3; ++i) {
+      volume.mutable_box()->add_center(0);
+      volume.mutable_box()->add_size(1);
+    }
+    std::ofstream(root_ / "volume", std::ios::binary) << session::framed(message);
+    std::ofstream(root_ / "program") << "#!/bin/sh\nROOT='" << root_.path().string() << "'\n"
+                                     << script << "\n";
+    fs::permissions(root_ / "program", fs::perms::owner_all);
+    LiveOptions options;
+    options.program = root_ / "program";
+    live_ = std::make_unique<LiveVolumes>(options, board_);
+    live_->start(root_ / "take 1", {});
+  }
+  bool reach(Live::State state) {
+    return test::wait_until([&] { return live_->status()->state() == state; });
+  }
+  void offer(double fill = 0, std::uint64_t lost = 0) {
+    RecordingLoad load;
+    load.queue_fill = fill;
+    load.lost = lost;
+    live_->offer({1, 1}, load);
+  }
+  [[nodiscard]] std::string pid() const {
+    std::ifstream in(root_ / "pid");
+    std::string text;
+    std::getline(in, text);
+    return text;
+  }
+  /// "R", "S", "T" (stopped) as ps shows it; empty: gone.
+  [[nodiscard]] std::string process_state() const {
+    std::ifstream stat("/proc/" + pid() + "/stat");
+    std::string text;
+    std::getline(stat, text);
+    const auto bracket = text.find(") ");
+    return bracket == std::string::npos ? "" : text.substr(bracket + 2, 1);
+  }
+
+  test::TempFolder root_;
+  Board board_;
+  std::unique_ptr<LiveVolumes> live_;
+};
+
+TEST_F(LiveVolumesTest, AVolumeIsShownWithItsDelay) {
+  start("cat $ROOT/volume >&3; exec sleep 100");
+  ASSERT_TRUE(reach(Live::RUNNING));
+  const v1::LiveStatus status = *live_->status();
+  EXPECT_EQ(status.session(), "take 1");
+  EXPECT_EQ(status.frame(), 12U);
+  EXPECT_GE(status.delay_s(), 0.5);
+  ASSERT_EQ(board_.iterations(0).size(), 1U);
+  EXPECT_EQ(board_.iterations(0).back()->live_delay_s(), status.delay_s());
+  live_->stop();
+  EXPECT_FALSE(live_->runs());
+  EXPECT_EQ(live_->status()->state(), Live::ENDED);
+  EXPECT_TRUE(board_.notices(0).empty());
+}
+
+TEST_F(LiveVolumesTest, TheChildIsToldTheSessionFirstAndRunsAtTheLowestPriority) {
+  start("nice > $ROOT/nice; head -c 3 > $ROOT/head; cat $ROOT/volume >&3; exec sleep 100");
+  ASSERT_TRUE(reach(Live::RUNNING));
+  EXPECT_EQ(test::bytes_of(root_ / "nice"), "19\n");
+  EXPECT_EQ(test::bytes_of(root_ / "head").size(), 3U);
+}
+
+TEST_F(LiveVolumesTest, ItStandsStillWhileTheRecordingHasTroubleAndGoesOn) {
+  start("echo $$ > $ROOT/pid.new; mv $ROOT/pid.new $ROOT/pid; cat $ROOT/volume >&3; exec sleep 100");
+  ASSERT_TRUE(reach(Live::RUNNING));
+  offer(0.6);
+  ASSERT_TRUE(reach(Live::PAUSED));
+  EXPECT_THAT(live_->status()->reason(), HasSubstr("goes first"));
+  EXPECT_TRUE(test::wait_until([&] { return process_state() == "T"; }));
+  EXPECT_TRUE(test::wait_until([&] {
+    offer();
+    return live_->status()->state() == Live::RUNNING;
+  }));
+  EXPECT_TRUE(test::wait_until([&] { return process_state() == "S"; }));
+}
+
+TEST_F(LiveVolumesTest, ItEndsWithAFrameThatTheRecordingLoses) {
+  start("cat $ROOT/volume >&3; exec sleep 100");
+  ASSERT_TRUE(reach(Live::RUNNING));
+  offer(0, 1);
+  ASSERT_TRUE(reach(Live::STOPPED));
+  ASSERT_TRUE(test::wait_until([&] { return !board_.notices(0).empty(); }));
+  EXPECT_THAT(board_.notices(0).back().text(), HasSubstr("goes on without live volumes"));
+  EXPECT_THAT(board_.notices(0).back().text(), HasSubstr("lost 1 frame"));
+  EXPECT_EQ(live_->status()->state(), Live::STOPPED);
+}
+
+TEST_F(LiveVolumesTest, AChildThatDiesIsTold) {
+  start("kill -9 $$");
+  ASSERT_TRUE(reach(Live::FAILED));
+  EXPECT_THAT(live_->status()->reason(), HasSubstr("was killed"));
+  ASSERT_TRUE(test::wait_until([&] { return !board_.notices(0).empty(); }));
+  EXPECT_FALSE(live_->runs());
+  start("echo nonsense >&2; exit 3");
+  ASSERT_TRUE(reach(Live::FAILED));
+  EXPECT_THAT(live_->status()->reason(), HasSubstr("exit code 3"));
+  EXPECT_THAT(live_->status()->reason(), HasSubstr("nonsense"));
+  start("head -c 100 /dev/zero | tr '\\0' '\\377' >&3; exec sleep 100");
+  ASSERT_TRUE(reach(Live::FAILED));
+  EXPECT_THAT(live_->status()->reason(), HasSubstr("can't be understood"));
+}
+
+TEST_F(LiveVolumesTest, WithoutTheProgramThereAreNone) {
+  LiveOptions options;
+  options.program = root_ / "nowhere";
+  live_ = std::make_unique<LiveVolumes>(options, board_);
+  EXPECT_FALSE(live_->status());
+  live_->start(root_ / "take 1", {});
+  ASSERT_TRUE(reach(Live::FAILED));
+  EXPECT_THAT(live_->status()->reason(), HasSubstr("nowhere"));
+}
+
+}  // namespace
+}  // namespace emberlock::daemon

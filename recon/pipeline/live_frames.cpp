@@ -18,18 +18,13 @@ constexpr double kShareOfInterval = 0.8;
 }  // namespace
 
 bool has_frame_at(const FramesSoFar& camera, TimePoint t) {
-  const std::vector<FrameStamp>& stamps = *camera.stamps;
-  const double period = camera.rate.value() > 0 ? 1 / camera.rate.value() : INFINITY;
-  std::optional<Seconds> nearest;
-  bool passed = false;
-  for (auto stamp = stamps.rbegin(); stamp != stamps.rend(); ++stamp) {
-    const Seconds after = stamp->monotonic_time - t;
-    if (after >= Seconds(0)) passed = true;
-    if (after < Seconds(-period)) break;
-    if (stamp->status == FrameStatus::complete) nearest = std::min(nearest.value_or(abs(after)), abs(after));
+  constexpr double kReach = 0.55;  // periods: half of one, and cameras jitter
+  const Seconds reach(camera.rate.value() > 0 ? kReach / camera.rate.value() : INFINITY);
+  for (auto stamp = camera.stamps->rbegin(); stamp != camera.stamps->rend(); ++stamp) {
+    if (stamp->monotonic_time - t < -reach) break;
+    if (stamp->status == FrameStatus::complete && abs(stamp->monotonic_time - t) <= reach) return true;
   }
-  if (!nearest || nearest->value() > period) return false;
-  return passed || nearest->value() <= period / 2;
+  return false;
 }
 
 std::optional<std::size_t> NewestFrames::next(const std::vector<FramesSoFar>& cameras) {

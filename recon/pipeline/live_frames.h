@@ -38,8 +38,8 @@ class NewestFrames {
   std::uint64_t skipped_ = 0;
 };
 
-/// Whether it is certain which of a camera's frames is nearest to `t`, whatever frames follow, and that it is
-/// a complete one within a frame period.
+/// Whether a camera has a complete frame within about half a frame period of `t`: the nearest, whatever
+/// frames follow.
 bool has_frame_at(const FramesSoFar& camera, TimePoint t);
 
 /// How long a volume may take.

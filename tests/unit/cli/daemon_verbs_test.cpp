@@ -316,12 +316,12 @@ TEST_F(DaemonVerbs, LiveVolumesAreAskedForWithTheRecordingAndToldBesideIt) {
   };
   const test::VerbRun result =
       run(add_record, {"record", "candle", "--live", "--every", "12", "--voxels", "48"});
-  EXPECT_EQ(result.code, 0) << result.err;
+  EXPECT_EQ(result.exit_code, 0) << result.err;
   EXPECT_EQ(asked.live().every(), 12U);
   EXPECT_EQ(asked.live().voxels(), 48U);
   EXPECT_THAT(result.out, HasSubstr("; live: frame 120, 0.9 s ago, 48 voxels, 0.41 s a volume, 11 shown, 109 "
                                     "skipped, on cuda"));
-  EXPECT_NE(run(add_record, {"record", "candle", "--every", "12"}).code, 0) << "without --live";
+  EXPECT_NE(run(add_record, {"record", "candle", "--every", "12"}).exit_code, 0) << "without --live";
 }
 
 TEST(LiveWords, SayWhatIsShownAndWhyNothingIs) {

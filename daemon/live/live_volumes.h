@@ -24,7 +24,7 @@ class ChildProcess;
 
 struct LiveOptions {
   std::filesystem::path program;  ///< `PROGRAM reconstruct-live`: emberlock, beside the daemon
-  std::string device;             ///< as of `emberlock reconstruct`; empty: auto
+  std::string device = {};        ///< as of `emberlock reconstruct`; empty: auto
   int threads = 0;                ///< on the CPU; 0: every core
   Seconds silence{600};           ///< a child that tells nothing for so long, while it may work, hangs
 };

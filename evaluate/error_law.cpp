@@ -15,12 +15,13 @@ namespace {
 
 constexpr double kLawPi = std::numbers::pi;
 constexpr double kUncertain = 0.03;  // of a picture's frequencies: what a solver leaves though it is told
+constexpr double kOwnSide = 0.2;     // of a picture that the opposite one doesn't tell
 constexpr int kSpokes = 6;           // directions of frequency in a judge's picture
-constexpr std::array<double, 3> kFrequencies{1, 0.5, 0.25};  // of the reach
-constexpr double kFirstReach = 1;
+constexpr double kFirstReach = 0.5;
 constexpr double kReachStep = 1.1;
 constexpr int kReaches = 36;
-constexpr double kBlurPower = 2;  // of the square of the error by motion blur
+constexpr double kBlurPower = 2;   // of the square of the error by motion blur
+constexpr double kChanged = 0.08;  // rise, in heights, after which the flame is another one: sync saturates
 constexpr int kDescents = 2000;
 
 Eigen::Vector3d law_direction(double azimuth, double elevation) {
@@ -30,20 +31,30 @@ Eigen::Vector3d law_direction(double azimuth, double elevation) {
 
 double correlation(const Eigen::Vector3d& distance) { return std::exp(-0.5 * distance.squaredNorm()); }
 
-/// The variance that is left of one frequency, of 1.
-double left_open(const std::vector<Eigen::Vector3d>& cameras, const Eigen::Vector3d& frequency) {
-  const auto n = static_cast<Eigen::Index>(cameras.size());
-  Eigen::Matrix3Xd nearest(3, n);
-  for (Eigen::Index i = 0; i < n; ++i) {
-    const Eigen::Vector3d& across = cameras[static_cast<std::size_t>(i)];
-    nearest.col(i) = frequency - frequency.dot(across) * across;
-  }
-  Eigen::MatrixXd among(n, n);
-  Eigen::VectorXd with(n);
-  for (Eigen::Index i = 0; i < n; ++i) {
-    with(i) = correlation(frequency - nearest.col(i));
-    for (Eigen::Index j = 0; j < n; ++j) among(i, j) = correlation(nearest.col(i) - nearest.col(j));
-    among(i, i) += kUncertain;
+/// What the pictures from two directions have in common by their sides: the flame takes light, so its near
+/// side outshines the far one.
+double of_sides(const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
+  return 1 - 0.5 * kOwnSide * (1 - a.dot(b));
+}
+
+/// The variance that is left of one frequency of a judge's picture, of 1.
+double left_open(const std::vector<Eigen::Vector3d>& cameras, const Eigen::Vector3d& judge,
+                 const Eigen::Vector3d& frequency) {
+  const std::size_t n = cameras.size();
+  std::vector<Eigen::Vector3d> nearest;
+  nearest.reserve(n);
+  for (const Eigen::Vector3d& camera : cameras)
+    nearest.emplace_back(frequency - frequency.dot(camera) * camera);
+  const auto size = static_cast<Eigen::Index>(n);
+  Eigen::MatrixXd among(size, size);
+  Eigen::VectorXd with(size);
+  for (std::size_t i = 0; i < n; ++i) {
+    const auto row = static_cast<Eigen::Index>(i);
+    with(row) = of_sides(judge, cameras[i]) * correlation(frequency - nearest[i]);
+    for (std::size_t j = 0; j < n; ++j)
+      among(row, static_cast<Eigen::Index>(j)) =
+          of_sides(cameras[i], cameras[j]) * correlation(nearest[i] - nearest[j]);
+    among(row, row) += kUncertain;
   }
   return std::max(0.0, 1 - with.dot(among.llt().solve(with)));
 }
@@ -54,7 +65,7 @@ ErrorSquares basis(const TwinRig& rig, double open) {
           rig.pixel * rig.pixel,
           rig.noise * rig.noise / static_cast<double>(rig.towards.size()),
           std::pow(rig.exposed, kBlurPower),
-          rig.late * rig.late,
+          rig.late * rig.late / (1 + std::pow(rig.late / kChanged, 2)),
           1};
 }
 
@@ -150,13 +161,12 @@ double unseen(const std::vector<Eigen::Vector3d>& cameras, double reach) {
   for (const Eigen::Vector3d& judge : judges) {
     const Eigen::Vector3d right = Eigen::Vector3d::UnitZ().cross(judge).normalized();
     const Eigen::Vector3d up = judge.cross(right);
-    for (const double part : kFrequencies)
-      for (int s = 0; s < kSpokes; ++s) {
-        const double angle = (s + 0.5) * kLawPi / kSpokes;
-        sum += left_open(cameras, part * reach * (std::cos(angle) * right + std::sin(angle) * up));
-      }
+    for (int s = 0; s < kSpokes; ++s) {
+      const double angle = (s + 0.5) * kLawPi / kSpokes;
+      sum += left_open(cameras, judge, reach * (std::cos(angle) * right + std::sin(angle) * up));
+    }
   }
-  return sum / static_cast<double>(judges.size() * kFrequencies.size() * kSpokes);
+  return sum / static_cast<double>(judges.size() * kSpokes);
 }
 
 ErrorSquares predict(const ErrorLaw& law, const TwinRig& rig) {
@@ -190,7 +200,8 @@ double balanced_exposure(const ErrorLaw& law, std::size_t cameras, double noise)
 std::vector<Eigen::Vector3d> even_planes(int cameras) {
   std::vector<Eigen::Vector3d> all;
   for (int k = 0; k < cameras; ++k)
-    all.push_back(law_direction(k * (kLawPi + kLawPi / cameras), (k % 2 == 0 ? 10 : -10) * kLawPi / 180));
+    all.push_back(
+        law_direction(k * (kLawPi + kLawPi / cameras), (k % 4 == 0 || k % 4 == 3 ? 10 : -10) * kLawPi / 180));
   return all;
 }
 

@@ -46,11 +46,13 @@ std::vector<Eigen::Vector3d> judge_directions();
 /// the Fourier slice theorem (Bracewell 1956) a picture tells the flame's spatial frequencies on the plane
 /// across its direction, and as the flame is finite, what it tells is correlated with its neighbourhood, by
 /// exp(-d^2 / 2) at a distance d. What remains of a judge's frequency is the variance of its best linear
-/// estimate from the cameras' nearest ones (kriging: Matheron 1963). `reach`: the finest frequency that
-/// matters, in units of that neighbourhood. Opposite cameras share a plane, so the second tells little.
+/// estimate from the cameras' nearest ones (kriging: Matheron 1963). `reach`: the frequency that stands for
+/// all, in units of that neighbourhood. Opposite cameras share a plane, so the second tells little: what of
+/// the flame outshines the rest on its own side.
 double unseen(const std::vector<Eigen::Vector3d>& towards, double reach);
 
-/// E^2 = sum strength_i basis_i(rig).
+/// E^2 = sum strength_i basis_i(rig), with the bases unseen(), pixel^2, noise^2 / cameras, exposed^2,
+/// late^2 / (1 + (late / 0.08)^2), as what is late by more is another flame, and 1.
 struct ErrorLaw {
   double reach = 1;
   ErrorSquares strength{};
@@ -77,7 +79,7 @@ Result<ErrorLaw> fit_error_law(const std::vector<MeasuredRig>& rigs);
 double balanced_exposure(const ErrorLaw& law, std::size_t cameras, double noise);
 
 /// Directions of `cameras` that all tell a plane of their own: camera k at an azimuth of k (180 + 180 / n)
-/// degrees, which for odd n is the ring, alternately 10 degrees above and below.
+/// degrees, which for odd n is the ring; neighbours alternately 10 degrees above and below.
 std::vector<Eigen::Vector3d> even_planes(int cameras);
 
 }  // namespace emberlock::evaluate

@@ -12,7 +12,7 @@
 namespace emberlock::evaluate {
 namespace {
 
-constexpr double kReach = 6;
+constexpr double kReach = 4;
 
 Eigen::Vector3d around(double degrees) {
   const double a = degrees * std::numbers::pi / 180;
@@ -55,7 +55,7 @@ TEST(Unseen, AnOppositeCameraTellsLessThanOneAcross) {
   const double opposite = unseen({around(0), around(180)}, kReach);
   const double across = unseen({around(0), around(90)}, kReach);
   EXPECT_LT(across, opposite);
-  EXPECT_NEAR(opposite, unseen({around(0), around(0)}, kReach), 1e-12) << "both see the same plane";
+  EXPECT_LT(opposite, unseen({around(0), around(0)}, kReach)) << "the other side is brighter there";
 }
 
 TEST(Unseen, CamerasOnPlanesOfTheirOwnBeatARingOfOppositeOnes) {
@@ -75,7 +75,7 @@ TEST(Unseen, NeverGrowsWithTheNumberOfCamerasOfADesign) {
   }
 }
 
-const ErrorLaw kTrue{std::pow(1.1, 20), {500, 3e4, 2, 900, 5000, 3}, 0};
+const ErrorLaw kTrue{0.5 * std::pow(1.1, 20), {500, 3e4, 2, 900, 5000, 3}, 0};
 
 /// Rigs that differ in every part.
 std::vector<MeasuredRig> measured_rigs() {

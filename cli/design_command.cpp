@@ -151,7 +151,7 @@ void run_design(const DesignArguments& a) {
   if (rig) {
     constexpr std::size_t kPlaces = 5;
     const evaluate::TwinRig twin = twin_of(page.law, page.request, *rig);
-    page.one_more = {*rig, predict(page.law, twin), Seconds(0), next_cameras(page.law, twin, kPlaces)};
+    page.one_more = {*rig, predict(page.law, twin), next_cameras(page.law, twin, kPlaces)};
   } else {
     page.design = evaluate::design(page.law, page.request);
     const double disk = or_fail(rig::doctor::write_speed(a.disk, std::uint64_t{64} << 20, Seconds(1)));

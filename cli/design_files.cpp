@@ -3,6 +3,7 @@
 
 #include <cmath>
 #include <optional>
+#include <string>
 
 #include <nlohmann/json.hpp>
 
@@ -12,29 +13,29 @@ namespace emberlock::cli {
 namespace {
 
 constexpr std::size_t kMostBytes = 4 << 20;
+constexpr double kMostNumber = 1e9;
 
-/// The object in a file; null if it is something else.
-Result<nlohmann::json> json_object(const std::filesystem::path& file) {
-  EMBERLOCK_ASSIGN_OR_RETURN(const std::string text, read_file(file, kMostBytes));
+/// The object in a text; null if it is something else.
+nlohmann::json json_object(std::string_view text) {
   nlohmann::json json = nlohmann::json::parse(text, nullptr, false);
   return json.is_object() ? json : nlohmann::json();
 }
 
-/// A finite number of at least `least`; nothing for anything else.
+/// A number of at least `least` and at most kMostNumber; nothing for anything else.
 std::optional<double> number_in(const nlohmann::json& json, const std::string& key, double least) {
   if (!json.is_object() || !json.contains(key) || !json[key].is_number()) return {};
   const double value = json[key].get<double>();
-  return std::isfinite(value) && value >= least ? std::optional(value) : std::nullopt;
+  return value >= least && value <= kMostNumber ? std::optional(value) : std::nullopt;
 }
 
 }  // namespace
 
-Result<BenchFile> read_bench_file(const std::filesystem::path& file) {
+Result<BenchFile> parse_bench_file(std::string_view text, const std::filesystem::path& file) {
   const auto refused = [&](const char* what) {
     return Error{ErrorKind::bad_input, what, file.string(),
                  "Give a file that `emberlock bench --json > FILE` wrote on that machine"};
   };
-  EMBERLOCK_ASSIGN_OR_RETURN(const nlohmann::json json, json_object(file));
+  const nlohmann::json json = json_object(text);
   if (!json.is_object() || !json.contains("machine") || !json["machine"].is_array())
     return refused("is not what bench writes");
   std::optional<double> quickest;
@@ -51,9 +52,9 @@ Result<BenchFile> read_bench_file(const std::filesystem::path& file) {
   return BenchFile{file.stem().string(), Seconds(*quickest)};
 }
 
-Result<evaluate::ErrorLaw> read_error_law(const std::filesystem::path& file) {
+Result<evaluate::ErrorLaw> parse_error_law(std::string_view text, const std::filesystem::path& file) {
   constexpr double kLeastReach = 1e-3;
-  EMBERLOCK_ASSIGN_OR_RETURN(const nlohmann::json json, json_object(file));
+  const nlohmann::json json = json_object(text);
   const auto refused = [&](const std::string& what) {
     return Error{ErrorKind::bad_input, what, file.string(), "Give the report.json of an `emberlock design`"};
   };
@@ -70,6 +71,16 @@ Result<evaluate::ErrorLaw> read_error_law(const std::filesystem::path& file) {
     law.strength[static_cast<std::size_t>(part)] = *strength;
   }
   return law;
+}
+
+Result<BenchFile> read_bench_file(const std::filesystem::path& file) {
+  EMBERLOCK_ASSIGN_OR_RETURN(const std::string text, read_file(file, kMostBytes));
+  return parse_bench_file(text, file);
+}
+
+Result<evaluate::ErrorLaw> read_error_law(const std::filesystem::path& file) {
+  EMBERLOCK_ASSIGN_OR_RETURN(const std::string text, read_file(file, kMostBytes));
+  return parse_error_law(text, file);
 }
 
 }  // namespace emberlock::cli

@@ -105,6 +105,9 @@ std::vector<NamedRig> sweep_rigs() {
     vary(fmt::format("exposed {:g}", rise), [&](TwinRig& rig) { rig.exposed = rise; });
   for (const double rise : {0.02, 0.06})
     vary(fmt::format("late {:g}", rise), [&](TwinRig& rig) { rig.late = rise; });
+  // In several parts, so that the law's spread tells of such rigs too.
+  rigs.push_back({"6 cameras, 64 pixels, moving", {even_planes(6), twin_pixel(64), 0.5, 0.04, 0.01}});
+  rigs.push_back({"12 on a ring, 160 pixels, late", {on_arc(12, 360), twin_pixel(160), 2, 0, 0.03}});
   return rigs;
 }
 

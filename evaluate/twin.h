@@ -42,7 +42,7 @@ struct NamedRig {
   std::string name;
   TwinRig rig;
 };
-/// Small rigs that differ in one part each: what a law is fitted to.
+/// Small rigs that differ in one part each, and two that do in several: what a law is fitted to.
 std::vector<NamedRig> sweep_rigs();
 /// Five others, of which each differs in several: what a law is checked by.
 std::vector<NamedRig> check_rigs();

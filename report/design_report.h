@@ -25,7 +25,6 @@ struct MachineMinutes {
 struct OneMore {
   evaluate::StandingRig rig;
   evaluate::ErrorSquares now{};
-  Seconds exposure{0};
   std::vector<evaluate::NextCamera> places;
 };
 

@@ -117,6 +117,12 @@ void measure_minutes(const DesignArguments& a, const std::vector<BenchFile>& oth
   for (const BenchFile& other : others) add(other.name, here.value() * (other.frame / usual));
 }
 
+void measure_costs(const DesignArguments& a, const std::vector<BenchFile>& others, report::DesignPage& page) {
+  const double disk = or_fail(rig::doctor::write_speed(a.disk, std::uint64_t{64} << 20, Seconds(1)));
+  page.recording = or_fail(evaluate::recording_of(page.request, page.design.chosen, disk));
+  measure_minutes(a, others, page);
+}
+
 /// Predicted and measured errors of rigs that the law wasn't fitted to.
 void print_check(const DesignArguments& a, const report::DesignPage& page) {
   evaluate::Twin twin(a.seed, a.threads);
@@ -154,9 +160,7 @@ void run_design(const DesignArguments& a) {
     page.one_more = {*rig, predict(page.law, twin), next_cameras(page.law, twin, kPlaces)};
   } else {
     page.design = evaluate::design(page.law, page.request);
-    const double disk = or_fail(rig::doctor::write_speed(a.disk, std::uint64_t{64} << 20, Seconds(1)));
-    page.recording = or_fail(evaluate::recording_of(page.request, page.design.chosen, disk));
-    measure_minutes(a, others, page);
+    if (page.design.reached) measure_costs(a, others, page);
   }
   if (!a.out.empty()) or_fail(report::write_design(page, where));
   if (a.json)

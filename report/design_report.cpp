@@ -47,8 +47,8 @@ double degrees(double radians) { return radians * 180 / std::numbers::pi; }
 
 /// "azimuth 120, elevation 10 degrees"
 std::string direction_words(const Eigen::Vector3d& towards) {
-  return fmt::format("azimuth {:.0f}, elevation {:.0f} degrees",
-                     degrees(std::atan2(towards.y(), towards.x())),
+  const double azimuth = degrees(std::atan2(towards.y(), towards.x()));
+  return fmt::format("azimuth {}, elevation {:.0f} degrees", std::lround(azimuth + 360) % 360,
                      degrees(std::asin(std::clamp(towards.z(), -1.0, 1.0))));
 }
 

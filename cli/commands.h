@@ -51,6 +51,7 @@ void add_sample(CLI::App& app);
 void add_simulate(CLI::App& app);
 void add_doctor(CLI::App& app);
 void add_bench(CLI::App& app);
+void add_design(CLI::App& app);
 void add_sessions(CLI::App& app);
 /// status, jobs, console, watch, record and strobe: those that only ask the daemon.
 void add_client(CLI::App& app);

@@ -29,7 +29,7 @@ struct VerbGroup {
 };
 const std::vector<VerbGroup>& verb_groups() {
   static const std::vector<VerbGroup> groups{
-      {"First steps", {"demo", "sample", "simulate", "doctor", "bench", "help", "completion"}},
+      {"First steps", {"demo", "sample", "simulate", "doctor", "bench", "design", "help", "completion"}},
       {"With the daemon (emberlockd)",
        {"status", "watch", "console", "strobe", "align", "record", "sessions", "jobs"}},
       {"Cameras", {"devices", "smear", "calibrate"}},

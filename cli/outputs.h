@@ -17,6 +17,7 @@ inline constexpr OutputVerb kBatch{"batch"};
 inline constexpr OutputVerb kTradeoffRecon{"tradeoff recon"};
 inline constexpr OutputVerb kTradeoffSync{"tradeoff sync"};
 inline constexpr OutputVerb kTradeoffRig{"tradeoff rig"};
+inline constexpr OutputVerb kDesign{"design"};
 inline constexpr OutputVerb kMeasure{"measure"};
 inline constexpr OutputVerb kRender{"render"};
 inline constexpr OutputVerb kScene{"scene"};

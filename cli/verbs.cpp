@@ -46,6 +46,7 @@ int main(int argc, char** argv) {
 #if EMBERLOCK_WITH_DRIVERS
   emberlock::cli::add_doctor(app);
   emberlock::cli::add_bench(app);
+  emberlock::cli::add_design(app);
 #endif
 #if EMBERLOCK_WITH_DAEMON
   emberlock::cli::add_client(app);

@@ -30,7 +30,14 @@ int rays_of(const RigTradeoffOptions& o, ImageSize size) {
   return std::max(1, static_cast<int>(std::lround(1.0 * o.images.back().width / size.width)));
 }
 
-/// Blocks of n x n pixels as one, with noise.
+/// What the pictures depend on.
+RigSetup pictures_of(RigSetup setup) {
+  for (const RigAxis axis : {RigAxis::voxels, RigAxis::effects, RigAxis::device}) setup = setup.with(axis, 0);
+  return setup;
+}
+
+}  // namespace
+
 recon::View averaged(const recon::View& fine, int n, double noise, std::uint64_t seed, std::uint64_t stream) {
   recon::View view = fine;
   recon::Intrinsics& lens = view.camera.intrinsics;
@@ -54,14 +61,6 @@ recon::View averaged(const recon::View& fine, int n, double noise, std::uint64_t
   view.image = recon::share(std::move(image));
   return view;
 }
-
-/// What the pictures depend on.
-RigSetup pictures_of(RigSetup setup) {
-  for (const RigAxis axis : {RigAxis::voxels, RigAxis::effects, RigAxis::device}) setup = setup.with(axis, 0);
-  return setup;
-}
-
-}  // namespace
 
 recon::Scene FilmedRig::film(const RigSetup& setup) const {
   const RigTradeoffOptions& o = options_;

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cstdint>
 #include <optional>
 #include <utility>
 
@@ -10,6 +11,9 @@
 #include "recon/preprocess/view.h"
 
 namespace emberlock::evaluate {
+
+/// A view with blocks of n x n pixels as one, with noise (RMS, grey levels) drawn by seed and stream.
+recon::View averaged(const recon::View& fine, int n, double noise, std::uint64_t seed, std::uint64_t stream);
 
 /// A rising flame of known truth, filmed and reconstructed by any set-up of RigTradeoffOptions. One further
 /// view judges all set-ups alike: in time, sharp, without noise, as large as the largest pictures.

@@ -196,7 +196,9 @@ void film(const Flame& flame, const PaperSceneOptions& options, Scene& scene) {
   march.step = options.truth_step;
   std::set<Seconds> delays;
   for (const View& view : scene.views) delays.insert(view.lateness);
-  std::vector<RadianceImage> images(scene.views.size(), RadianceImage(options.image));
+  std::vector<RadianceImage> images;
+  images.reserve(scene.views.size());
+  for (const View& view : scene.views) images.emplace_back(view.camera.intrinsics.size);
   const int instants = instants_of(options);
   for (const Seconds late : delays)
     for (int i = 0; i < instants; ++i) {
@@ -311,21 +313,27 @@ FlameTruth Flame::at(Seconds time, const Grid& grid) const {
 }
 
 Scene paper_scene(const PaperSceneOptions& options) {
-  Scene scene;
-  scene.box = {Eigen::Vector3d::Zero(), Eigen::Vector3d::Constant(0.2)};
+  std::vector<View> views;
   const Intrinsics intrinsics = pinhole(options.image, 60);
   const auto place = [&](const std::string& name, double azimuth, double elevation, ViewRole role) {
     View view{
         name, look_at(intrinsics, on_sphere(0.3, azimuth, elevation), Eigen::Vector3d::Zero()), {}, role};
-    const std::size_t i = scene.views.size();
+    const std::size_t i = views.size();
     view.lateness = i < options.lateness.size() ? options.lateness[i] : Seconds(0);
-    scene.views.push_back(std::move(view));
+    views.push_back(std::move(view));
   };
   const double step = 360.0 / options.cameras;
   const double first = 90 - (std::round(options.cameras / 4.0) - 0.5) * step;
   for (int i = 0; i < options.cameras; ++i)
     place("camera " + std::to_string(i), first + step * i, i % 2 == 0 ? 10 : -10, ViewRole::input);
   place("test view", 90, 0, ViewRole::held_out);
+  return filmed_scene(std::move(views), options);
+}
+
+Scene filmed_scene(std::vector<View> views, const PaperSceneOptions& options) {
+  Scene scene;
+  scene.box = {Eigen::Vector3d::Zero(), Eigen::Vector3d::Constant(0.2)};
+  scene.views = std::move(views);
   const Flame flame(options.flame);
   film(flame, options, scene);
   if (options.averaged_frames > 0) film_average(flame, options, scene);

@@ -81,4 +81,8 @@ struct PaperSceneOptions {
 /// around, so that the held-out view is the same.
 Scene paper_scene(const PaperSceneOptions& options = {});
 
+/// The same flame in the same box, filmed by any cameras: pictures for views that have all else. The options'
+/// cameras, image and lateness aren't heeded; those of the views are.
+Scene filmed_scene(std::vector<View> views, const PaperSceneOptions& options);
+
 }  // namespace emberlock::recon

@@ -158,6 +158,9 @@ class OutputFolders : public testing::Test {
     const std::string session = (temp_ / "session").string();
     const std::string scene = (temp_ / "scene.json").string();
     write(scene, R"({"format": "emberlock scene", "version": 1, "flames": [{"result": "hot/volume.vdb"}]})");
+    const std::string law = (temp_ / "law" / "law.json").string();
+    write(law, R"({"law": {"reach": 5, "spread": 0.1, "strength": {"views": 400, "pixels": 4e4, "noise": 1,)"
+               R"( "exposure": 1e3, "sync": 1e3, "rest": 1}}})");
     const std::string marker_film = make_marker_film(temp_ / "marker.mkv").string();
     Words clips = make_clips(temp_ / "clips");
     const fs::path clip = clips.front();
@@ -198,6 +201,12 @@ class OutputFolders : public testing::Test {
           "--exposures", "1", "--tolerances", "5", "--devices", "cpu", "--rigs", "20"},
          {},
          {"points.csv", "rig.json", "index.html"}},
+        {"design",
+         "--out",
+         add_design,
+         {"design", "--flame", "0.16,1,1800", "--target-error", "250", "--law", law},
+         law,
+         {"report.html", "report.json"}},
         {"calibrate cameras",
          "--out",
          add_calibrate,
@@ -329,7 +338,7 @@ TEST_F(OutputFolders, TheTablesHoldEveryVerbThatWritesOne) {
        {add_devices, add_smear,    add_align,  add_reconstruct, add_verify,  add_tradeoff, add_calibrate,
         add_import,  add_demo,     add_sample, add_doctor,      add_bench,   add_sessions, add_status,
         add_jobs,    add_watch,    add_record, add_strobe,      add_measure, add_simulate, add_render,
-        add_export,  add_evaluate, add_scene,  add_ar,          add_stylize, add_batch})
+        add_export,  add_evaluate, add_scene,  add_ar,          add_stylize, add_batch,    add_design})
     add(app);
   std::set<std::string> found;
   cli::visit(app, "emberlock", [&](const CLI::App& verb, const std::string& path) {

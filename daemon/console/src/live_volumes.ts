@@ -69,7 +69,7 @@ export class LiveChoice {
 /** What is told beside the volume. */
 export class LiveLine {
   private readonly age = el('p', {class: 'live-age'});
-  private readonly effort = el('p', {class: 'note'});
+  private readonly effort = el('p', {class: 'live-effort'});
   private readonly reason = el('p', {class: 'live-reason', role: 'status'});
   readonly root = el('div', {class: 'live-volumes', hidden: true}, this.age, this.effort, this.reason);
 

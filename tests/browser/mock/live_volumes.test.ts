@@ -34,7 +34,7 @@ test('the newest volume is shown, how old it is, what it takes and what was skip
   await until(() => text(page, '.live-age'), words => /^frame 120, [0-9]+\.[0-9] s ago$/.test(words), 'the delay');
   rig.mock.show({live: live(0.9)});
   await until(() => text(page, '.live-age'), words => /^frame 120, (0\.9|1\.[0-9]) s ago$/.test(words), 'the delay now');
-  expect(await text(page, '.live-volumes .note')).toBe('0.41 s a volume of 48 voxels · on cuda · 11 shown, 109 skipped (they are recorded)');
+  expect(await text(page, '.live-volumes .live-effort')).toBe('0.41 s a volume of 48 voxels · on cuda · 11 shown, 109 skipped (they are recorded)');
   expect(await text(page, '#reconstruction header .word')).toBe('live');
   expect(await page.locator('#reconstruction .pair').isVisible()).toBe(false);
   rig.mock.show({live: live(3)});

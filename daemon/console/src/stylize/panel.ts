@@ -141,7 +141,7 @@ export class Panel implements Bench {
     this.queue = step;
     return step.then(async answer => {
       if (!answer) return false;
-      this.take(answer);
+      this.answered(answer);
       await this.seenAfter(answer.passes);
       return true;
     });
@@ -149,6 +149,7 @@ export class Panel implements Bench {
 
   /** Until a preview shows more passes than these. */
   private seenAfter(before: number): Promise<void> {
+    if ((this.previewed?.passes ?? 0) > before) return Promise.resolve();
     return new Promise(resolve => {
       const heard = (passes: number): void => {
         if (passes <= before) return;
@@ -163,7 +164,12 @@ export class Panel implements Bench {
 
   private look(): void {
     const view = this.views.value;
-    this.queue = this.queue.then(() => act(call('Reconstruct/Edit', {view}))).then(answer => this.take(answer ?? this.now!));
+    this.queue = this.queue.then(() => act(call('Reconstruct/Edit', {view}))).then(answer => this.answered(answer ?? this.now!));
+  }
+
+  /** By another way than previews, one of which may have come before and know more. */
+  private answered(status: StylizationStatus): void {
+    if (!this.previewed || status.passes >= this.previewed.passes) this.take(status);
   }
 
   private begin(id: string): void {

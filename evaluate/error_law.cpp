@@ -169,6 +169,8 @@ double unseen(const std::vector<Eigen::Vector3d>& cameras, double reach) {
   return sum / static_cast<double>(judges.size() * kSpokes);
 }
 
+double uncertainty(const ErrorLaw& law) { return std::hypot(law.spread, kJointSpread); }
+
 ErrorSquares predict(const ErrorLaw& law, const TwinRig& rig) {
   ErrorSquares squares = basis(rig, unseen(rig.towards, law.reach));
   for (std::size_t j = 0; j < kErrorParts; ++j) squares[j] *= law.strength[j];

@@ -60,6 +60,12 @@ struct ErrorLaw {
       0;  ///< RMS of predicted / measured - 1 of rigs that were left out of the fit, one at a time
 };
 
+/// RMS by which the law missed rigs that differ from those of a sweep in several things at once: five rigs
+/// with three flames (docs/design.md).
+inline constexpr double kJointSpread = 0.10;
+/// Standard error of a predicted error, relative to it: `spread` and that.
+double uncertainty(const ErrorLaw& law);
+
 /// Errors with their parts, grey levels.
 ErrorSquares predict(const ErrorLaw& law, const TwinRig& rig);
 

@@ -27,7 +27,7 @@ std::string rig_words(const DesignedRig& rig) {
 }
 
 std::string error_words(const DesignPage& page, double error) {
-  return fmt::format("{:.2f} +- {:.2f} grey levels", error, page.law.spread * error);
+  return fmt::format("{:.2f} +- {:.2f} grey levels", error, evaluate::uncertainty(page.law) * error);
 }
 
 std::string verdict(const DesignPage& page) {
@@ -305,8 +305,10 @@ std::string design_html(const DesignPage& page) {
     html.paragraph(fmt::format(
         "{} small rigs were simulated and reconstructed, twelve further views judging each. A law of six "
         "parts, whose squares add up, was fitted to them. It predicts each of them to {:.0f} % (RMS) when it "
-        "is fitted to the others; the +- above is that.",
-        page.measured.size(), 100 * page.law.spread));
+        "is fitted to the others, and rigs that differ from them in several things to {:.0f} % "
+        "(docs/design.md); "
+        "the +- above is both.",
+        page.measured.size(), 100 * page.law.spread, 100 * evaluate::kJointSpread));
     sweep_table(html, page);
   }
   html.paragraph(fmt::format(

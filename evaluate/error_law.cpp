@@ -150,6 +150,7 @@ double total(const ErrorSquares& squares) {
 std::vector<Eigen::Vector3d> judge_directions() {
   constexpr int kJudges = 12;
   std::vector<Eigen::Vector3d> all;
+  all.reserve(kJudges);
   for (int i = 0; i < kJudges; ++i)
     all.push_back(law_direction((i * 360.0 / kJudges + 7) * kLawPi / 180, (i % 3 - 1) * 15 * kLawPi / 180));
   return all;
@@ -201,6 +202,7 @@ double balanced_exposure(const ErrorLaw& law, std::size_t cameras, double noise)
 
 std::vector<Eigen::Vector3d> even_planes(int cameras) {
   std::vector<Eigen::Vector3d> all;
+  all.reserve(static_cast<std::size_t>(std::max(0, cameras)));
   for (int k = 0; k < cameras; ++k)
     all.push_back(
         law_direction(k * (kLawPi + kLawPi / cameras), (k % 4 == 0 || k % 4 == 3 ? 10 : -10) * kLawPi / 180));

@@ -83,7 +83,7 @@ TEST_F(LiveVolumesTest, AVolumeIsShownWithItsDelay) {
   EXPECT_EQ(status.session(), "take 1");
   EXPECT_EQ(status.frame(), 12U);
   EXPECT_GE(status.delay_s(), 0.5);
-  ASSERT_EQ(board_.iterations(0).size(), 1U);
+  ASSERT_TRUE(test::wait_until([&] { return board_.iterations(0).size() == 1; })) << "behind the status";
   EXPECT_EQ(board_.iterations(0).back()->live_delay_s(), status.delay_s());
   live_->stop();
   EXPECT_FALSE(live_->runs());

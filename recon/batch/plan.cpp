@@ -9,6 +9,8 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
+#include "recon/batch/whole_number.h"
+
 namespace emberlock::recon {
 namespace {
 
@@ -59,10 +61,10 @@ Result<BatchPlan> parse_plan(std::string_view text, const std::string& where) tr
   BatchPlan plan;
   json.at("input").get_to(plan.input);
   json.at("session").get_to(plan.session);
-  json.at("chunk").get_to(plan.chunk);
-  json.at("voxels").get_to(plan.voxels);
+  plan.chunk = whole_number<int>(json.at("chunk"));
+  plan.voxels = whole_number<int>(json.at("voxels"));
   json.at("options").get_to(plan.options);
-  json.at("frames").get_to(plan.frames);
+  for (const auto& frame : json.at("frames")) plan.frames.push_back(whole_number<std::uint64_t>(frame));
   const bool rising =
       std::adjacent_find(plan.frames.begin(), plan.frames.end(), std::greater_equal<>()) == plan.frames.end();
   if (plan.frames.empty() || !rising || plan.chunk < 1 || plan.voxels < 1)

@@ -17,6 +17,7 @@
 
 #include "base/file.h"
 #include "base/unique_fd.h"
+#include "recon/batch/whole_number.h"
 
 namespace emberlock::recon {
 namespace {
@@ -90,9 +91,9 @@ std::string to_json(const Worker& worker) {
 
 Result<Worker> parse_worker(std::string_view text, const std::string& where) try {
   const auto json = nlohmann::json::parse(text);
-  return Worker{json.at("host").get<std::string>(), json.at("boot").get<std::string>(),
-                json.at("pid").get<std::int64_t>(), json.at("started").get<std::uint64_t>(),
-                json.at("rank").get<int>(),         json.at("device").get<std::string>()};
+  return Worker{json.at("host").get<std::string>(),         json.at("boot").get<std::string>(),
+                whole_number<std::int64_t>(json.at("pid")), whole_number<std::uint64_t>(json.at("started")),
+                whole_number<int>(json.at("rank")),         json.at("device").get<std::string>()};
 } catch (const std::exception& e) {
   return Error{ErrorKind::bad_input, e.what(), where};
 }

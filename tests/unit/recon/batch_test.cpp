@@ -54,6 +54,12 @@ TEST(BatchPlanTest, IsWrittenAndReadToTheSame) {
   EXPECT_EQ(read->input, "s");
   for (const char* bad : {"", "{}", "[1]", R"({"format": "emberlock sequence", "version": 1})"})
     EXPECT_EQ(parse_plan(bad, "here").error().kind, ErrorKind::bad_input) << bad;
+  for (const char* number : {"99999999999999999999", "1e29", "-1", "3000000000", "2.5"}) {
+    std::string text = to_json(plan());
+    const std::size_t at = text.find("32");
+    ASSERT_NE(at, std::string::npos);
+    EXPECT_FALSE(parse_plan(text.replace(at, 2, number), "here").ok()) << number;
+  }
   BatchPlan none = plan();
   none.frames = {3, 3};
   EXPECT_FALSE(parse_plan(to_json(none), "here").ok());

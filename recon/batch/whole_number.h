@@ -13,7 +13,8 @@ namespace emberlock::recon {
 template <class T>
 T whole_number(const nlohmann::json& json) {
   if (json.is_number_unsigned()) {
-    if (const auto number = json.get<std::uint64_t>(); std::in_range<T>(number)) return static_cast<T>(number);
+    if (const auto number = json.get<std::uint64_t>(); std::in_range<T>(number))
+      return static_cast<T>(number);
   } else if (json.is_number_integer()) {
     if (const auto number = json.get<std::int64_t>(); std::in_range<T>(number)) return static_cast<T>(number);
   }

@@ -14,6 +14,7 @@
 #include "base/log.h"
 #include "base/version.h"
 #include "daemon/engine/engine.h"
+#include "daemon/hosts/lending_server.h"
 #include "daemon/server/grpc_server.h"
 #include "daemon/server/http_server.h"
 #include "daemon/server/pictures.h"
@@ -158,6 +159,10 @@ Status serve(const rig::DaemonConfig& config) {
       }));
   EMBERLOCK_ASSIGN_OR_RETURN(const std::unique_ptr<GrpcServer> grpc_server,
                              GrpcServer::start(*engine, std::move(grpc)));
+  std::unique_ptr<LendingServer> lending_server;
+  if (!config.hosts.listen.empty()) {
+    EMBERLOCK_ASSIGN_OR_RETURN(lending_server, LendingServer::start(*engine, config.hosts));
+  }
   std::unique_ptr<HttpServer> http_server;
   if (!config.server.http_listen.empty()) {
     HttpServerOptions options = http_options(config.server, access);

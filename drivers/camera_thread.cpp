@@ -40,9 +40,6 @@ enum class Task { start, stop, next_frame, reset_shutter, trim_rate };
 constexpr std::array<std::string_view, 5> kTasks{"start", "stop", "next_frame", "reset_shutter", "trim_rate"};
 std::string_view name(Task task) { return kTasks[static_cast<std::size_t>(task)]; }
 
-/// How long before its instant the reset command is passed to the camera.
-constexpr Seconds kPrepared = milliseconds(5);
-
 }  // namespace
 
 /// State shared by the thread and its owner. Only the thread uses the camera.
@@ -299,7 +296,7 @@ class CameraThread::Worker : public std::enable_shared_from_this<Worker> {
   /// The first order that is due. An order for an instant is passed to the camera slightly earlier, so that
   /// the thread needn't wake at exactly that instant.
   std::optional<Order> due() {
-    const Time soon = after(now(), kPrepared);
+    const Time soon = after(now(), options_.reset_ahead);
     const auto first = std::find_if(orders_.begin(), orders_.end(),
                                     [&](const Order& order) { return order.begins <= soon; });
     if (first == orders_.end()) return {};
@@ -311,7 +308,7 @@ class CameraThread::Worker : public std::enable_shared_from_this<Worker> {
   /// How long the thread may wait for a frame.
   [[nodiscard]] Seconds until_next_order() const {
     Seconds wait = kSlice;
-    for (const Order& order : orders_) wait = std::min(wait, -since(order.begins) - kPrepared);
+    for (const Order& order : orders_) wait = std::min(wait, -since(order.begins) - options_.reset_ahead);
     return std::max(wait, Seconds(0));
   }
 

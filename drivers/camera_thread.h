@@ -15,6 +15,8 @@ struct CameraThreadOptions {
   std::size_t queue_frames = 64;  ///< capacity of the queue; when it is full the oldest frame is lost. >= 1
   Seconds retry = milliseconds(250);            ///< interval between two searches for a lost camera, > 0
   Seconds call_deadline = kCallDeadline * 1.5;  ///< a call that takes longer counts as hanging, > 0
+  /// How long before its instant a reset is passed to the camera, >= 0.
+  Seconds reset_ahead = milliseconds(5);
   /// What start() does while the camera is absent: it fails, or it searches for the camera as if it had been
   /// lost.
   enum class Absent { fails, is_looked_for } absent = Absent::fails;

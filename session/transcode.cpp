@@ -56,9 +56,11 @@ Status transcode_camera(const fs::path& folder, v1::CameraStream& stream, const 
 }  // namespace
 
 Status transcode(const fs::path& folder, const Observer& observer) {
-  EMBERLOCK_ASSIGN_OR_RETURN(v1::Manifest manifest, read_manifest(folder));
+  EMBERLOCK_RETURN_IF_ERROR(read_manifest(folder));
   EMBERLOCK_ASSIGN_OR_RETURN(const EventLog lock,
                              EventLog::open(events_path(folder), EventLog::Mode::reopen));
+  // Who held it before may have written it.
+  EMBERLOCK_ASSIGN_OR_RETURN(v1::Manifest manifest, read_manifest(folder));
   if (manifest.state() == v1::Manifest::RECORDING) {
     return Error{ErrorKind::bad_input, "the recording isn't finished", folder.string(), "Salvage it first"};
   }

@@ -93,6 +93,7 @@ Result<v1::StrobeState> Conductor::strobe() {
 }
 
 Result<v1::StrobeState> Conductor::apply_strobe(const v1::StrobeState& wanted) {
+  EMBERLOCK_RETURN_IF_ERROR(check_not_lent());
   if (state_.phase != v1::IDLE && state_.phase != v1::CAPTURING) {
     return state_.phase == v1::FINISHING
                ? Error{ErrorKind::refused, "a recording is being finished", "strobe", "Ask again in a moment"}
@@ -165,6 +166,7 @@ void Conductor::work() {
   watch_devices();
   watch_disk();
   watch_reconstruction();
+  watch_hosts();
   switch (state_.phase) {
     case v1::CALIBRATING:
       return measure_row_time();
@@ -224,10 +226,11 @@ void Conductor::watch_load(TimePoint now) {
   for (const MachineEvent& event : overload_.look(work, now)) static_cast<void>(happen(event));
 }
 
-/// The flame burns while nothing is aligned, so that cameras can be exposed for it, and in recordings of it.
+/// The flame burns while nothing is aligned, here or by who leads, so that cameras can be exposed for it, and in recordings of it.
 void Conductor::set_scene() {
   const bool records = state_.phase == v1::CAPTURING || state_.phase == v1::FINISHING;
-  const bool burns = state_.phase == v1::IDLE || (records && !records_strobe());
+  const bool idle = state_.phase == v1::IDLE && parts_.loan.leader(SteadyClock().now()).empty();
+  const bool burns = idle || (records && !records_strobe());
   static_cast<void>(parts_.rig.show(burns ? rig::Rig::Scene::flame : rig::Rig::Scene::strobe));
 }
 
@@ -248,6 +251,12 @@ std::vector<v1::CameraStatus::State> Conductor::camera_states() const {
   std::vector<v1::CameraStatus::State> states;
   for (std::size_t i = 0; i < parts_.rig.size(); ++i) states.push_back(shown(parts_.rig.state(i)));
   return states;
+}
+
+std::vector<drivers::FrameCounts> Conductor::own_counts() const {
+  std::vector<drivers::FrameCounts> own = counts();
+  own.resize(parts_.rig.own());
+  return own;
 }
 
 std::vector<drivers::FrameCounts> Conductor::counts() const {

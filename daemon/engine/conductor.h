@@ -16,6 +16,8 @@
 #include "daemon/engine/overload_watch.h"
 #include "daemon/engine/recorder.h"
 #include "daemon/engine/words.h"
+#include "daemon/hosts/host_parts.h"
+#include "daemon/hosts/loan.h"
 #include "daemon/live/live_volumes.h"
 #include "daemon/reconstruction/child.h"
 #include "daemon/work/jobs.h"
@@ -36,7 +38,9 @@ struct ConductorParts {
   session::SessionStore& store;
   ReconstructionChild& reconstruction;
   LiveVolumes& live;
-  Jobs& jobs;  ///< those in the background stand still while something is recorded
+  Loan& loan;        ///< of the cameras to another host
+  HostParts& hosts;  ///< whose cameras are in the rig
+  Jobs& jobs;        ///< those in the background stand still while something is recorded
   Board& board;
   UpkeepTold told = {};  ///< what became of a session in the background
 };
@@ -63,6 +67,16 @@ class Conductor {
   Status acknowledge(const v1::AcknowledgeRequest& request);
   Result<v1::StrobeState> strobe();
   Result<v1::StrobeState> apply_strobe(const v1::StrobeState& wanted);
+
+  // What a leading host asks for (hosts.proto).
+  Result<v1::LentCameras> lend(const std::string& leader);
+  Result<std::size_t> lent_camera(const std::string& leader, const std::string& camera_id);
+  Status reset_lent(const v1::ResetRequest& request);
+  Status trim_lent(const v1::TrimRequest& request);
+  Result<v1::HostPart> record_part(const v1::PartRequest& request);
+  Status stop_part(const v1::StopPartRequest& request);
+  /// Error out_of_data: there is none.
+  Result<v1::HostPart> part(const v1::FindPartRequest& request);
 
   // What became of a session in the background.
   void transcoded(const std::string& session, const JobResult& result);
@@ -96,6 +110,17 @@ class Conductor {
   void begin_alignment();
   void end_alignment();
   void begin_recording();
+  Status begin_take(const v1::RecordRequest& request, const std::filesystem::path& folder);
+  /// Of this host's recording: what it is of, whose it is, the evidence of the lock.
+  [[nodiscard]] v1::Manifest describe_take() const;
+  [[nodiscard]] std::optional<v1::DecisionEvent> lock_evidence() const;
+  /// What each other host is asked for: leaves in the manifest this host's cameras, and names the others' parts.
+  [[nodiscard]] std::vector<v1::PartRequest> part_requests(
+      v1::Manifest& manifest, const std::optional<v1::DecisionEvent>& lock) const;
+  void watch_hosts();
+  [[nodiscard]] Status check_not_lent() const;
+  [[nodiscard]] bool records_for_another() const { return part_ && recorder_; }
+  void describe_hosts(v1::DaemonStatus& status) const;
   void begin_finishing();
   void finish_recording();
   void conclude_recording(v1::RecordingStatus status);
@@ -125,6 +150,8 @@ class Conductor {
   /// Why alignment failed: a device that is gone, else itself.
   void explain_failure(const Error& error);
   [[nodiscard]] std::vector<drivers::FrameCounts> counts() const;
+  /// Of this host's cameras alone.
+  [[nodiscard]] std::vector<drivers::FrameCounts> own_counts() const;
   [[nodiscard]] std::vector<v1::CameraStatus::State> camera_states() const;
   void remember(const rig::AlignRoundReport& round);
   /// Of the alignment's last round.
@@ -160,6 +187,8 @@ class Conductor {
   std::shared_ptr<JobHandle> finishing_;
   std::shared_ptr<v1::RecordingStatus> finished_;  ///< what it brings
   v1::RecordRequest record_request_;
+  std::optional<v1::PartRequest> part_;  ///< the recording is for another host
+  std::optional<TimePoint> part_ends_;   ///< as that one said
   bool lit_for_recording_ = false;  ///< the strobe flashes for the recording alone
   Status begun_;                    ///< how the recording asked for last began
   std::filesystem::path record_folder_;

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Aligning the cameras, and holding what was reached.
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <utility>
@@ -12,6 +13,7 @@ namespace emberlock::daemon {
 namespace {
 
 constexpr std::size_t kHistory = 500;
+constexpr Seconds kRemoteLead = milliseconds(150);
 
 v1::RoundPoint point_of(const rig::AlignRoundReport& report, TimePoint began) {
   v1::RoundPoint point;
@@ -54,12 +56,15 @@ Result<rig::AlignRunOptions> options_of(const v1::AlignRequest& request, rig::Al
     EMBERLOCK_ASSIGN_OR_RETURN(options.align.policy, smear::parse_align_policy(request.policy()));
   }
   if (request.anyway()) options.align.limits.reset();
+  // An order to another host is on its way for a while.
+  if (rig.own() < rig.size()) options.reset_lead = std::max(options.reset_lead, kRemoteLead);
   return options;
 }
 
 }  // namespace
 
 Status Conductor::align(const v1::AlignRequest& request) {
+  EMBERLOCK_RETURN_IF_ERROR(check_not_lent());
   if (devices_.strobe == nullptr) {
     return Error{ErrorKind::refused, "the rig has no strobe, so nothing tells the shutters' phases",
                  "[rig.strobe]", "Configure one"};

@@ -7,13 +7,12 @@
 
 #include "base/clock.h"
 #include "daemon/engine/conductor.h"
+#include "daemon/engine/host_evidence.h"
 #include "daemon/engine/words.h"
 #include "drivers/replay/record.h"
-#include "rig/align/decision_proto.h"
 #include "rig/recording_rate.h"
 #include "session/files.h"
 #include "session/name.h"
-#include "smear_sync/align/stagger.h"
 
 namespace emberlock::daemon {
 namespace {
@@ -31,22 +30,17 @@ constexpr std::chrono::milliseconds kFinishSlice{4};
 constexpr Seconds kFrameDeadline{3};
 /// A camera so slow that this many of its frames take longer than kNobodyFilms is waited for.
 constexpr double kFramesWaited = 3;
-
-/// Staggered cameras' places in the frame period, known to the tolerance that the lock holds.
-void describe_stagger(const rig::Alignment& alignment, v1::Manifest& manifest) {
-  if (!smear::staggered(alignment.cameras())) return;
-  const smear::AlignOptions& options = alignment.options();
-  for (v1::CameraStream& stream : *manifest.mutable_cameras())
-    for (const smear::AlignCamera& camera : alignment.cameras()) {
-      if (camera.id != stream.camera_id()) continue;
-      stream.set_late_s(camera.offset.value());
-      stream.set_late_sigma_s(options.tolerance.in_time(options.row_time).value());
-    }
-}
+/// From asking the other hosts to the first frame of all.
+constexpr Seconds kHostsBegin = milliseconds(150);
+/// For their parts to be finished.
+constexpr Seconds kHostsFinish{5};
+/// Pictures of a camera that is lent and recorded: for its leader's console.
+constexpr Seconds kLentWhileRecorded{0.5};
 
 }  // namespace
 
 Status Conductor::record(const v1::RecordRequest& request) {
+  EMBERLOCK_RETURN_IF_ERROR(check_not_lent());
   if (!std::isfinite(request.seconds()) || request.seconds() < 0) {
     return Error{ErrorKind::bad_input, "is no length of time", "seconds", "Give 0 or more"};
   }
@@ -58,13 +52,23 @@ Status Conductor::record(const v1::RecordRequest& request) {
                  "See to the cameras: those that were lost are taken up again by themselves, and restarting "
                  "emberlockd begins a replay anew"};
   if (request.has_live()) EMBERLOCK_RETURN_IF_ERROR(check_live(request.live()));
+  if (request.reconstruct() && parts_.hosts.any())
+    return Error{ErrorKind::refused, "its parts will lie on several hosts, so it can't be handed on", "reconstruct",
+                 "Record without it, join the parts by `emberlock sessions join`, and reconstruct that"};
+  return begin_take(request, folder);
+}
+
+Status Conductor::begin_take(const v1::RecordRequest& request, const std::filesystem::path& folder) {
   const std::string name = folder.filename().string();
   const AskRecord ask{name, request.unlocked(), request.reconstruct(),
                       take_length(Seconds(request.seconds()))};
   // A lock that was renewed for this take need not hold for so long again.
   if (alignment_) alignment_->hold_for(align_options_.align.shortest_take);
   const MachineStep asked = step(state_, ask, utc_now());
-  if (asked.refusal) return words(*asked.refusal);
+  if (asked.refusal) {
+    if (!recorder_) part_.reset();
+    return words(*asked.refusal);
+  }
   record_folder_ = folder;
   record_request_ = request;
   begun_ = {};
@@ -76,7 +80,7 @@ Status Conductor::stop_recording() { return happen(AskStopRecording{}); }
 
 void Conductor::begin_recording() {
   const TimePoint now = parts_.rig.clock().now();
-  record_began_ = now;
+  record_began_ = part_ ? TimePoint{part_->from_ns()} : now;
   spread_.reset();
   if (state_.lock == Lock::held) spread_ = alignment_->worst_pair(now);
   if (records_strobe()) {
@@ -91,18 +95,17 @@ void Conductor::begin_recording() {
       transport = std::max(transport, camera->info().transport);
     record_began_ = now + 2 * alignment_->options().period + transport;
   }
-  v1::Manifest manifest;
-  manifest.set_session_id(state_.session);
-  manifest.set_created_utc(utc_now());
-  manifest.set_purpose(record_request_.purpose().empty() ? "flame" : record_request_.purpose());
-  parts_.geometry.describe(parts_.rig, manifest);
-  if (alignment_ && state_.lock == Lock::held) describe_stagger(*alignment_, manifest);
+  if (parts_.hosts.any()) record_began_ = std::max(record_began_, now + kHostsBegin);
+  v1::Manifest manifest = describe_take();
+  const std::optional<v1::DecisionEvent> lock = lock_evidence();
+  const std::vector<v1::PartRequest> parts = part_requests(manifest, lock);
   RecorderOptions options{parts_.config.recording.writer, parts_.config.recording.queue};
   if (!real_time()) options.queue.when_full = session::WhenFull::wait;
   // Before the disk is asked for anything: it would stand behind what a salvage writes.
   parts_.jobs.pause();
-  auto recorder = Recorder::begin(record_folder_, manifest, options, counts(), record_began_);
+  auto recorder = Recorder::begin(record_folder_, manifest, options, own_counts(), record_began_);
   if (!recorder.ok()) {
+    part_.reset();
     parts_.jobs.resume();
     darken_strobe();
     begun_ = recorder.error();
@@ -113,15 +116,17 @@ void Conductor::begin_recording() {
   if (records_strobe() && devices_.strobe != nullptr)
     static_cast<void>(
         recorder_->append(drivers::strobe_event(now, alignment_ ? alignment_->strobe() : strobe_settings_)));
-  if (alignment_ && state_.lock == Lock::held) {
-    v1::Event lock;
-    lock.set_monotonic_ns(now.ns);
-    *lock.mutable_decision() = rig::lock_evidence(*alignment_, now);
-    static_cast<void>(recorder_->append(lock));
+  if (lock) {
+    v1::Event event;
+    event.set_monotonic_ns(now.ns);
+    *event.mutable_decision() = part_of(*lock, 0, parts_.rig.own());
+    static_cast<void>(recorder_->append(event));
   }
   last_frame_.reset();
   expired_ = false;
-  counted_before_ = counts();
+  counted_before_ = own_counts();
+  parts_.loan.hold(part_.has_value());
+  if (!parts.empty()) static_cast<void>(parts_.hosts.begin(record_folder_, parts));
   if (record_request_.has_live()) parts_.live.start(record_folder_, record_request_.live());
   static_cast<void>(happen(RecordingBegun{}));
 }
@@ -145,7 +150,7 @@ void Conductor::feed_live() {
   if (!parts_.live.runs() || (live_fed_ && now - *live_fed_ < kLiveInterval)) return;
   live_fed_ = now;
   RecordedNow recorded = recorder_->now();
-  const std::vector<drivers::FrameCounts> counted = counts();
+  const std::vector<drivers::FrameCounts> counted = own_counts();
   for (std::size_t i = 0; i < counted.size(); ++i) {
     const drivers::FrameCounts made = counted[i] - counted_before_[i];
     recorded.load.lost += made.underrun + made.queue;
@@ -184,14 +189,16 @@ void Conductor::end_recording() {
   const double seconds = record_request_.seconds();
   record_ended_ = parts_.rig.clock().now();
   if (seconds > 0) record_ended_ = std::min(record_ended_, record_began_ + Seconds(seconds));
+  if (part_ends_) record_ended_ = std::min(record_ended_, *std::exchange(part_ends_, std::nullopt));
   recorder_->end(record_ended_);
+  parts_.hosts.end(record_folder_, record_ended_);
   parts_.live.stop();
 }
 
 /// Whether each camera's frames until the recording's end have been taken, or needn't be waited for.
 bool Conductor::all_have_come() const {
   if (parts_.rig.clock().now() - record_ended_ > kLongestWay) return true;
-  for (std::size_t i = 0; i < devices_.cameras.size(); ++i) {
+  for (std::size_t i = 0; i < parts_.rig.own(); ++i) {
     if (parts_.rig.state(i) == drivers::CameraThread::State::filming && !ended_[i] && !recorder_->has_all(i))
       return false;
   }
@@ -202,11 +209,13 @@ bool Conductor::all_have_come() const {
 void Conductor::begin_finishing() {
   darken_strobe();
   finished_ = std::make_shared<v1::RecordingStatus>();
-  const auto finish = [recorder = recorder_.get(), finished = finished_, after = counts(),
-                       now = parts_.rig.clock().now()](const Observer& observer) -> JobResult {
+  const auto finish = [recorder = recorder_.get(), finished = finished_, after = own_counts(),
+                       now = parts_.rig.clock().now(), folder = record_folder_,
+                       &hosts = parts_.hosts](const Observer& observer) -> JobResult {
     *finished = recorder->finish(after, now, [&](double fraction, std::string_view doing) {
       static_cast<void>(observer(fraction, doing));
     });
+    static_cast<void>(hosts.close(folder, kHostsFinish));  // what it can't write now it writes later
     v1::JobOutcome outcome;
     outcome.set_ok(finished->state() == v1::RecordingStatus::COMPLETE);
     return outcome;
@@ -228,6 +237,8 @@ void Conductor::finish_recording() {
 
 void Conductor::conclude_recording(v1::RecordingStatus status) {
   recorder_.reset();
+  part_.reset();
+  parts_.loan.hold(false);
   const bool failed = status.state() == v1::RecordingStatus::FAILED;
   // One whose counts disagree is finished all the same.
   const auto manifest = session::read_manifest(record_folder_);
@@ -287,6 +298,8 @@ void Conductor::capture() {
     static_cast<void>(
         happen(FaultRaised{{v1::Fault::DISK_FAILED, state_.session}, v1::RED, DiskRefused{*failure}}));
     static_cast<void>(happen(RecordingEnds{DiskRefused{*failure}}));
+  } else if (part_ && parts_.loan.silence(SteadyClock().now()) > Seconds(part_->alone_s())) {
+    static_cast<void>(happen(RecordingEnds{Why::leader_gone}));
   } else if (seconds > 0 && now - record_began_ >= Seconds(seconds)) {
     static_cast<void>(happen(RecordingEnds{TimeOver{Seconds(seconds)}}));
   } else if (std::all_of(ended_.begin(), ended_.end(), [](bool ended) { return ended; })) {
@@ -323,7 +336,8 @@ void Conductor::drain() {
       }
       trouble_told_[i] = false;
       last_frame_ = std::max(last_frame_.value_or(frame->stamp.monotonic_time), frame->stamp.monotonic_time);
-      if (recorded) recorder_->take(i, std::move(*frame));
+      parts_.loan.offer(i, *frame, cameras[i]->counts(), recorded ? kLentWhileRecorded : Seconds(0));
+      if (recorded && i < parts_.rig.own()) recorder_->take(i, std::move(*frame));
       if (!by_itself) break;
     }
   }
@@ -338,6 +352,7 @@ void Conductor::note_trouble(std::size_t camera, const Error& error) {
   }
   if (trouble_told_[camera]) return;
   trouble_told_[camera] = true;
+  parts_.loan.fail(camera, error);
   parts_.board.notice(v1::AMBER, error.message());
 }
 
@@ -356,7 +371,7 @@ void Conductor::watch_disk() {
   if (disk_looked_ && now - *disk_looked_ < kDiskInterval) return;
   disk_looked_ = now;
   std::vector<drivers::CameraInfo> infos;
-  for (const drivers::Camera* camera : devices_.cameras) infos.push_back(camera->info());
+  for (std::size_t i = 0; i < parts_.rig.own(); ++i) infos.push_back(devices_.cameras[i]->info());
   const auto storage =
       parts_.store.storage(rig::bytes_per_second(infos, parts_.config.recording.writer.encoding));
   if (!storage.ok()) {

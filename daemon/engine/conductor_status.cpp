@@ -136,6 +136,7 @@ v1::DaemonStatus Conductor::status() const {
   if (const auto reconstruction = parts_.reconstruction.status())
     *status.mutable_reconstruction() = *reconstruction;
   if (const auto live = parts_.live.status()) *status.mutable_live() = *live;
+  describe_hosts(status);
   *status.mutable_storage() = storage_;
   for (const v1::Job& job : parts_.jobs.list())
     if (!job.session().empty()) *status.add_jobs() = job;
@@ -161,6 +162,7 @@ void Conductor::describe_cameras(v1::DaemonStatus& status) const {
     camera.set_id(info.id);
     camera.set_model(info.model);
     camera.set_driver(std::string(parts_.rig.driver(i)));
+    camera.set_host(parts_.rig.host(i));
     camera.set_state(states[i]);
     camera.set_width(stream.width());
     camera.set_height(stream.height());

@@ -2,13 +2,13 @@
 #include "daemon/engine/engine.h"
 
 #include <chrono>
-#include <future>
 #include <utility>
 
 #include <fmt/format.h>
 
 #include "base/clock.h"
 #include "daemon/engine/device_message.h"
+#include "daemon/engine/hosts_of.h"
 #include "rig/devices/device_list.h"
 #include "session/export.h"
 #include "session/files.h"
@@ -75,29 +75,37 @@ Result<std::unique_ptr<Engine>> Engine::start(const rig::DaemonConfig& config, B
       if (const std::string& id = (*ids)[camera]; !ar->offer(id, frame)) show(id, frame);
     };
   }
+  EMBERLOCK_ASSIGN_OR_RETURN(HostParts::Hosts hosts, hosts_of(config));
+  if (!hosts.empty()) rig_options.remote = remote_cameras(hosts);
   EMBERLOCK_ASSIGN_OR_RETURN(std::unique_ptr<rig::Rig> rig,
                              rig::Rig::open(config.rig, std::move(rig_options)));
   for (std::size_t i = 0; i < rig->size(); ++i) ids->push_back(rig->camera(i).info().id);
   EMBERLOCK_ASSIGN_OR_RETURN(rig::Geometry geometry, rig::Geometry::of(config.rig, *rig));
   std::unique_ptr<Engine> engine(
-      new Engine(config, board, std::move(store), std::move(rig), std::move(geometry), ar));
+      new Engine(config, board, std::move(store), std::move(rig), std::move(geometry), ar, std::move(hosts)));
   engine->take_up_work();
   return engine;
 }
 
 Engine::Engine(const rig::DaemonConfig& config, Board& board, session::SessionStore store,
-               std::unique_ptr<rig::Rig> rig, rig::Geometry geometry, std::shared_ptr<LiveAr> ar)
+               std::unique_ptr<rig::Rig> rig, rig::Geometry geometry, std::shared_ptr<LiveAr> ar,
+               HostParts::Hosts hosts)
     : config_(config),
       board_(board),
       store_(std::move(store)),
       rig_(std::move(rig)),
       geometry_(std::move(geometry)),
+      loan_(rig_->size()),
+      hosts_(std::move(hosts), leader_name(config.rig.name)),
       reconstruction_(reconstruction_options(config), board, jobs_),
       live_(live_options(reconstruction_options(config)), board),
       ar_(std::move(ar)),
       thread_([this] { run(); }) {}
 
-void Engine::take_up_work() { take_up(store_, jobs_, config_.recording.transcode, told()); }
+void Engine::take_up_work() {
+  take_up(store_, jobs_, config_.recording.transcode, told());
+  if (hosts_.any()) hosts_.take_up(session::sessions_in(store_.folder()));
+}
 
 UpkeepTold Engine::told() {
   UpkeepTold told;
@@ -132,7 +140,7 @@ void Engine::run() {
   const auto went_round = [this] { went_round_ns_ = SteadyClock().now().ns; };
   went_round();  // cameras that hang take seconds each to start
   Conductor conductor(
-      {*rig_, geometry_, config_, store_, reconstruction_, live_, jobs_, board_, told()},
+      {*rig_, geometry_, config_, store_, reconstruction_, live_, loan_, hosts_, jobs_, board_, told()},
       [this, went_round] {
         went_round();
         return urgent_ > 0 || ending_;
@@ -198,25 +206,6 @@ void Engine::post(std::function<void(Conductor&)> call) {
     calls_.push_back(std::move(call));
   }
   asked_.notify_all();
-}
-
-template <class Answer>
-Answer Engine::on_thread(Urgency urgency, std::function<Answer(Conductor&)> call) {
-  auto promise = std::make_shared<std::promise<Answer>>();
-  std::future<Answer> answer = promise->get_future();
-  const bool urgent = urgency == Urgency::interrupts;
-  if (urgent) ++urgent_;
-  post([this, urgent, promise = std::move(promise), call = std::move(call)](Conductor& conductor) {
-    if (urgent) --urgent_;
-    Answer made = call(conductor);
-    show(conductor);  // whoever has the answer finds in the status what it did, however long the round lasts
-    promise->set_value(std::move(made));
-  });
-  try {
-    return answer.get();
-  } catch (const std::future_error&) {
-    return Error{ErrorKind::refused, "it is shutting down", "emberlockd", "Start it again"};
-  }
 }
 
 bool Engine::alive() const {

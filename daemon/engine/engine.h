@@ -6,6 +6,7 @@
 #include <deque>
 #include <filesystem>
 #include <functional>
+#include <future>
 #include <memory>
 #include <mutex>
 #include <string_view>
@@ -15,14 +16,17 @@
 #include "daemon/api.h"
 #include "daemon/ar/live_ar.h"
 #include "daemon/engine/conductor.h"
+#include "daemon/hosts/host_parts.h"
+#include "daemon/hosts/lending_server.h"
+#include "daemon/hosts/loan.h"
 #include "daemon/work/jobs.h"
 #include "daemon/work/upkeep.h"
 
 namespace emberlock::daemon {
 
 /// The daemon behind its servers: a conductor on a thread of its own, which alone touches the devices, and
-/// what clients ask of it. Any thread may call the Api.
-class Engine final : public Api {
+/// what clients ask of it. Any thread may call the Api, and what a host that leads may ask.
+class Engine final : public Api, public Lender {
  public:
   /// Sees every frame that no flame is put into, by its camera's id, on that camera's thread: it must return
   /// at once.
@@ -76,6 +80,15 @@ class Engine final : public Api {
   Result<v1::ArStatus> start_ar(const v1::ArRequest& request) override;
   Result<v1::ArStatus> stop_ar() override { return ar_->stop(); }
 
+  Result<v1::LentCameras> lend(const std::string& leader) override;
+  void hear(const std::string& leader) override;
+  Result<std::shared_ptr<LentFrames>> watch(const v1::FramesRequest& request) override;
+  Status reset(const v1::ResetRequest& request) override;
+  Status trim(const v1::TrimRequest& request) override;
+  Result<v1::HostPart> record_part(const v1::PartRequest& request) override;
+  Status stop_part(const v1::StopPartRequest& request) override;
+  Result<v1::HostPart> part(const v1::FindPartRequest& request) override;
+
  private:
   enum class Urgency {
     waits,       ///< until the round that is filmed is over
@@ -83,7 +96,8 @@ class Engine final : public Api {
   };
 
   Engine(const rig::DaemonConfig& config, Board& board, session::SessionStore store,
-         std::unique_ptr<rig::Rig> rig, rig::Geometry geometry, std::shared_ptr<LiveAr> ar);
+         std::unique_ptr<rig::Rig> rig, rig::Geometry geometry, std::shared_ptr<LiveAr> ar,
+         HostParts::Hosts hosts);
   void take_up_work();
   [[nodiscard]] UpkeepTold told();
   /// Refused while it is salvaged.
@@ -101,6 +115,8 @@ class Engine final : public Api {
   session::SessionStore store_;
   std::unique_ptr<rig::Rig> rig_;
   rig::Geometry geometry_;
+  Loan loan_;
+  HostParts hosts_;
   ReconstructionChild reconstruction_;
   LiveVolumes live_;
   std::shared_ptr<LiveAr> ar_;  ///< the cameras' threads have it too
@@ -125,5 +141,24 @@ class Engine final : public Api {
   Jobs jobs_;
   std::thread thread_;  ///< last: it uses all of the above
 };
+
+template <class Answer>
+Answer Engine::on_thread(Urgency urgency, std::function<Answer(Conductor&)> call) {
+  auto promise = std::make_shared<std::promise<Answer>>();
+  std::future<Answer> answer = promise->get_future();
+  const bool urgent = urgency == Urgency::interrupts;
+  if (urgent) ++urgent_;
+  post([this, urgent, promise = std::move(promise), call = std::move(call)](Conductor& conductor) {
+    if (urgent) --urgent_;
+    Answer made = call(conductor);
+    show(conductor);  // whoever has the answer finds in the status what it did, however long the round lasts
+    promise->set_value(std::move(made));
+  });
+  try {
+    return answer.get();
+  } catch (const std::future_error&) {
+    return Error{ErrorKind::refused, "it is shutting down", "emberlockd", "Start it again"};
+  }
+}
 
 }  // namespace emberlock::daemon

@@ -38,7 +38,8 @@ enum class Why {
   camera_lost,
   camera_hangs,
   no_camera_left,
-  last = no_camera_left,
+  leader_gone,  ///< nothing was heard of the host that leads for too long
+  last = leader_gone,
 };
 
 /// A camera that doesn't film.
@@ -106,9 +107,14 @@ struct ReconstructionFailed {
   std::string text;
 };
 
+/// Another host's part of a recording.
+struct HostPartIs {
+  v1::HostPart part;
+};
+
 using Reason =
     std::variant<Why, Error, RecordingOf, ReconstructionOf, AlignmentSays, TimeOver, NoFrames, DiskRefused,
-                 Outcome, ClockMoved, RoomLeft, Overload, ReconstructionDone, ReconstructionFailed>;
+                 Outcome, ClockMoved, RoomLeft, Overload, ReconstructionDone, ReconstructionFailed, HostPartIs>;
 
 /// Who a fault concerns: by these it is raised once, and mended.
 struct FaultKey {
@@ -141,6 +147,7 @@ struct Remark {
     compressed,
     not_compressed,  ///< cancelled
     not_salvaged,
+    part_known,  ///< another host's, of a recording
     fault,
     fault_over,
     last = fault_over,

@@ -53,6 +53,8 @@ std::string sentence(Why why) {
       return "the camera doesn't answer any more";
     case Why::no_camera_left:
       return "no camera is left";
+    case Why::leader_gone:
+      return "nothing is heard of the host that leads";
   }
   return {};
 }
@@ -134,6 +136,14 @@ struct ReasonSentence {
   }
   std::string operator()(const ReconstructionDone& it) const { return "done: the result is in " + it.result; }
   std::string operator()(const ReconstructionFailed& it) const { return it.text; }
+  std::string operator()(const HostPartIs& it) const {
+    const std::string part = "the part of host " + it.part.host();
+    if (it.part.state() == v1::HostPart::MISSING) return part + " is missing: " + it.part.why();
+    if (it.part.state() == v1::HostPart::SHORT) return part + " isn't whole: " + it.part.why();
+    return it.part.state() == v1::HostPart::WHOLE
+               ? fmt::format("{} is whole: {} frames there, {} lost", part, it.part.frames(), it.part.lost())
+               : part + " is being recorded";
+  }
 };
 
 std::string remedy_of_lost_lock(const Reason& reason) {
@@ -228,6 +238,7 @@ std::string words(const Remark& remark) {
     case Code::recording_ends:
       return fmt::format("recording {} ends: {}", subject, why);
     case Code::recorded:
+    case Code::part_known:
     case Code::not_salvaged:
       return with_subject(subject, why);
     case Code::not_handed_on:
@@ -316,6 +327,13 @@ std::string remedy(v1::Fault::Kind kind, const Reason& reason) {
     case v1::Fault::OVERLOADED: {
       const auto* overload = std::get_if<Overload>(&reason);
       return relief(overload == nullptr ? Bottleneck::processor : overload->what);
+    }
+    case v1::Fault::PART_WANTING: {
+      const auto* is = std::get_if<HostPartIs>(&reason);
+      return is != nullptr && is->part.state() == v1::HostPart::SHORT
+                 ? "What was recorded there is kept: see to that host before the next take"
+                 : "See to that host and to the network: it records on by itself, and is asked until its part is "
+                   "known";
     }
     case v1::Fault::NOTHING_RECORDED:
       return "See to the cameras, and record again once `emberlock status` says that they film";

@@ -32,16 +32,42 @@ bool is_real(CameraSource source) {
   return source == CameraSource::v4l2 || source == CameraSource::aravis || source == CameraSource::ptp;
 }
 
+/// The host of HOST:PORT or [HOST]:PORT; nullopt for other text.
+std::optional<std::string> host_of(const std::string& address) {
+  const std::size_t colon = address.rfind(':');
+  if (colon == std::string::npos || colon == 0) return std::nullopt;
+  std::uint16_t port = 0;
+  const char* const end = address.data() + address.size();
+  const auto [stop, failed] = std::from_chars(address.data() + colon + 1, end, port);
+  if (failed != std::errc{} || stop != end) return std::nullopt;
+  std::string host = address.substr(0, colon);
+  if (host.front() == '[' && host.back() == ']' && host.size() > 2) return host.substr(1, host.size() - 2);
+  return host.find(':') == std::string::npos ? std::optional(host) : std::nullopt;
+}
+
 void check_camera(const ConfigCheck& t, const CameraConfig& camera, const std::string& path,
                   std::set<std::pair<CameraSource, std::string>>& ids) {
-  if (is_real(camera.source) && camera.id.empty()) {
+  const bool remote = camera.source == CameraSource::remote;
+  if (remote && !host_of(camera.host)) {
+    t.problem(place(t.root, path + ".host"),
+              camera.host.empty() ? "the camera has no host" : "\"" + camera.host + "\" is no address",
+              "say host = \"HOST:PORT\", where its emberlockd lends it");
+  }
+  if ((is_real(camera.source) || remote) && camera.id.empty()) {
     t.problem(place(t.root, path), "the camera has no id", "say id = as `emberlock devices` names it");
   }
   if (!camera.id.empty() && !fit_for_a_folder(camera.id)) {
     t.problem(place(t.root, path + ".id"), "the id is no name for a folder",
               "give letters, digits, space and . _ : -");
   }
-  if (!ids.insert({camera.source, camera.id}).second) {
+  // A session knows cameras by their ids alone.
+  const bool twice = std::any_of(ids.begin(), ids.end(), [&](const auto& other) {
+    return other.second == camera.id && (other.first == camera.source || remote || other.first == CameraSource::remote);
+  });
+  if (twice && remote) {
+    t.problem(place(t.root, path + ".id"), "two cameras have the id \"" + camera.id + "\"",
+              "give the one that is simulated another id; of two hosts' equal ids one can't be in the rig");
+  } else if (!ids.insert({camera.source, camera.id}).second) {
     t.problem(place(t.root, path + ".id"), "two cameras of one driver have the id \"" + camera.id + "\"",
               "give each its own id, or several alike by count");
   }
@@ -61,8 +87,13 @@ void check_rig(const ConfigCheck& t) {
     const CameraConfig& camera = rig.cameras[i];
     check_camera(t, camera, fmt::format("rig.camera[{}]", i), ids);
     if (camera.source == CameraSource::virtual_) virtual_cameras += camera.count;
-    real = real || is_real(camera.source);
+    real = real || is_real(camera.source) || camera.source == CameraSource::remote;
     replay = replay || camera.source == CameraSource::replay;
+  }
+  const auto own = [](const CameraConfig& camera) { return camera.source != CameraSource::remote; };
+  if (!rig.cameras.empty() && std::none_of(rig.cameras.begin(), rig.cameras.end(), own)) {
+    t.problem(place(t.root, "rig.camera"), "all cameras are other hosts'",
+              "lead from a host that has one of them");
   }
   if (virtual_cameras > kMostVirtual) {
     t.problem(place(t.root, "rig.camera"), fmt::format("there are {} virtual cameras", virtual_cameras),
@@ -87,17 +118,28 @@ void check_rig(const ConfigCheck& t) {
   }
 }
 
-/// The host of HOST:PORT or [HOST]:PORT; nullopt for other text.
-std::optional<std::string> host_of(const std::string& address) {
-  const std::size_t colon = address.rfind(':');
-  if (colon == std::string::npos || colon == 0) return std::nullopt;
-  std::uint16_t port = 0;
-  const char* const end = address.data() + address.size();
-  const auto [stop, failed] = std::from_chars(address.data() + colon + 1, end, port);
-  if (failed != std::errc{} || stop != end) return std::nullopt;
-  std::string host = address.substr(0, colon);
-  if (host.front() == '[' && host.back() == ']' && host.size() > 2) return host.substr(1, host.size() - 2);
-  return host.find(':') == std::string::npos ? std::optional(host) : std::nullopt;
+void check_hosts(const ConfigCheck& t) {
+  const HostsConfig& hosts = t.config.hosts;
+  const auto& cameras = t.config.rig.cameras;
+  const bool lends = !hosts.listen.empty();
+  const bool leads = std::any_of(cameras.begin(), cameras.end(),
+                                 [](const CameraConfig& c) { return c.source == CameraSource::remote; });
+  if (lends && !host_of(hosts.listen)) {
+    t.problem(place(t.root, "hosts.listen"), "\"" + hosts.listen + "\" is no address",
+              "give HOST:PORT, as 0.0.0.0:7143");
+  }
+  if (lends && leads) {
+    t.problem(place(t.root, "hosts.listen"), "a host that has other hosts' cameras lends none",
+              "leave listen out, or the cameras of driver \"remote\"");
+  }
+  if (!lends && !leads) return;
+  const char* who = lends ? "listen" : "driver \"remote\"";
+  for (const auto& [path, key] : {std::pair(&hosts.certificate, "certificate"), std::pair(&hosts.key, "key"),
+                                  std::pair(&hosts.authority, "authority")}) {
+    if (path->empty())
+      t.problem(place(t.root, "hosts.listen"), fmt::format("{} needs {}", who, key),
+                fmt::format("give {} in [hosts]", key));
+  }
 }
 
 bool is_local(const std::string& host) {
@@ -134,6 +176,7 @@ void check_server(const ConfigCheck& t) {
 void check_consistency(const ConfigCheck& check) {
   check_rig(check);
   check_server(check);
+  check_hosts(check);
 }
 
 }  // namespace emberlock::rig::config

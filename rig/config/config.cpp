@@ -155,8 +155,9 @@ void anchor(DaemonConfig& config, const std::filesystem::path& folder) {
   from_folder(config.recording.folder);
   if (config.reconstruction.program.has_parent_path()) from_folder(config.reconstruction.program);
   ServerConfig& server = config.server;
+  HostsConfig& hosts = config.hosts;
   for (auto* path : {&server.socket, &server.tls_certificate, &server.tls_key, &server.tls_clients,
-                     &server.token_file, &server.console}) {
+                     &server.token_file, &server.console, &hosts.certificate, &hosts.key, &hosts.authority}) {
     from_folder(*path);
   }
 }

@@ -27,16 +27,18 @@
 // the structs here. Where another header already has the options, the key sets them directly.
 namespace emberlock::rig {
 
-enum class CameraSource { virtual_, v4l2, aravis, ptp, replay };
+enum class CameraSource { virtual_, v4l2, aravis, ptp, replay, remote };
 
 /// [[rig.camera]]: one camera, or several of the same kind.
 struct CameraConfig {
   CameraSource source = CameraSource::virtual_;
-  /// Real camera: its id as listed by `emberlock devices`, never empty. Recorded camera: its id in the
+  /// Real camera: its id as listed by `emberlock devices`, never empty. Another host's: its id there, never
+  /// empty. Recorded camera: its id in the
   /// session; empty: all cameras of the session. Virtual cameras: the id, or the prefix of the ids if `count`
   /// > 1.
   std::string id;
-  int count = 1;  ///< virtual cameras only
+  std::string host{};  ///< of a remote camera: HOST:PORT of the emberlockd that lends it
+  int count = 1;       ///< virtual cameras only
   drivers::CameraRequest
       request{};  ///< virtual cameras use size, format, frame rate and exposure; replayed ones nothing
   std::optional<SensorKind> sensor{};       ///< default: by the driver; ccd for virtual cameras
@@ -141,6 +143,16 @@ struct ServerConfig {
   std::uint64_t message_bytes = std::uint64_t{4} << 20;  ///< maximum size of a client's request
 };
 
+/// [hosts]: cameras of several hosts as one rig. All of them show certificates to each other, so one identity
+/// serves for lending and for leading.
+struct HostsConfig {
+  std::string listen;  ///< where this host's cameras are lent, "host:port"; empty: they aren't
+  std::filesystem::path certificate, key;  ///< PEM, of this host
+  std::filesystem::path authority;         ///< PEM, of who signs all hosts' certificates
+  /// How long a recording for another host goes on when nothing is heard from that one.
+  Seconds alone{600};
+};
+
 struct LogConfig {
   enum class Format { text, json };
   std::string level = "info";
@@ -153,6 +165,7 @@ struct DaemonConfig {
   RecordingConfig recording{};
   ReconstructionConfig reconstruction{};
   ServerConfig server{};
+  HostsConfig hosts{};
   LogConfig log{};
 };
 

@@ -29,6 +29,9 @@ class Preflight {
     readable("server.tls_certificate", server.tls_certificate);
     readable("server.tls_clients", server.tls_clients);
     secret("server.tls_key", server.tls_key);
+    readable("hosts.certificate", config.hosts.certificate);
+    readable("hosts.authority", config.hosts.authority);
+    secret("hosts.key", config.hosts.key);
     if (!server.token_file.empty()) {
       if (const auto token = Token::read(server.token_file); !token)
         problem("server.token_file", server.token_file, token.error().what, token.error().remedy);

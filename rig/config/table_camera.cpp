@@ -23,7 +23,8 @@ const std::vector<std::pair<std::string_view, CameraSource>> kSources{{"virtual"
                                                                       {"v4l2", CameraSource::v4l2},
                                                                       {"aravis", CameraSource::aravis},
                                                                       {"ptp", CameraSource::ptp},
-                                                                      {"replay", CameraSource::replay}};
+                                                                      {"replay", CameraSource::replay},
+                                                                      {"remote", CameraSource::remote}};
 
 /// Restricts a key to cameras of these drivers.
 Key<CameraConfig> of(std::vector<CameraSource> sources, Key<CameraConfig> key) {
@@ -83,12 +84,16 @@ Keys camera_keys() {
       choice<C>("driver", EMBERLOCK_AT(source), kSources,
                 "Kind of camera. \"virtual\" is simulated, \"v4l2\" is what Linux drives itself, \"aravis\" "
                 "is GigE Vision and USB3 Vision, \"ptp\" is a Canon with CHDK, \"replay\" is a recorded "
-                "camera. Required."),
+                "camera, \"remote\" is another host's. Required."),
       text<C>("id", EMBERLOCK_AT(id), "letters, digits, space and . _ : -",
-              "The camera's id, as `emberlock devices` prints it. For \"replay\": the id in the session; all "
+              "The camera's id, as `emberlock devices` prints it, for \"remote\" on its host. For \"replay\": the id in the session; all "
               "cameras of the session if absent. For \"virtual\": a name, or with count > 1 the prefix of "
               "the names; \"virtual\" if absent.",
               "\"virtual\""),
+      of({remote}, text<C>("host", EMBERLOCK_AT(host), "HOST:PORT",
+                           "Where the emberlockd that has the camera lends it (listen in its [hosts]). "
+                           "Needs certificate, key and authority in [hosts].",
+                           "\"lab-2:7143\"")),
       of({virtual_},
          number<C>("count", EMBERLOCK_AT(count), {1, 64}, "Number of cameras with these settings.")),
       of(kFilming,

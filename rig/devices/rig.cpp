@@ -38,6 +38,8 @@ std::string_view driver_name(CameraSource source) {
       return "ptp";
     case CameraSource::replay:
       return "replay";
+    case CameraSource::remote:
+      return "remote";
   }
   return "";
 }
@@ -88,9 +90,14 @@ Result<std::unique_ptr<Rig>> Rig::open(const RigConfig& config, RigOptions optio
         rig->add_borrowed(rig->virtual_->camera(virtual_cameras++), driver_name(camera.source), camera);
     } else if (camera.source == CameraSource::replay) {
       EMBERLOCK_RETURN_IF_ERROR(rig->add_recorded(camera));
-    } else {
+    } else if (camera.source != CameraSource::remote) {
       EMBERLOCK_RETURN_IF_ERROR(rig->add_real(camera, rate_of(config)));
     }
+  }
+  rig->own_ = rig->cameras_.size();
+  for (const CameraConfig& camera : config.cameras) {
+    if (camera.source == CameraSource::remote)
+      EMBERLOCK_RETURN_IF_ERROR(rig->add_remote(camera, rate_of(config)));
   }
   EMBERLOCK_RETURN_IF_ERROR(rig->open_strobe(config));
   return rig;
@@ -172,6 +179,15 @@ Status Rig::add_real(const CameraConfig& config, Hertz rate) {
   return {};
 }
 
+Status Rig::add_remote(const CameraConfig& config, Hertz rate) {
+  if (!options_.remote)
+    return refuse("another host's camera is led by emberlockd alone", "camera " + config.id,
+                  "put it into emberlockd's configuration");
+  drivers::CameraInfo expected{.id = config.id, .model = "", .layout = {}, .frame_rate = rate};
+  add(options_.remote(config, std::move(expected)), driver_name(config.source), config);
+  return {};
+}
+
 Status Rig::add_recorded(const CameraConfig& config) {
   bool found = false;
   for (std::size_t i = 0; i < replay_->cameras.size(); ++i) {
@@ -193,6 +209,7 @@ Status Rig::add_recorded(const CameraConfig& config) {
 void Rig::add(std::unique_ptr<drivers::Camera> camera, std::string_view driver, const CameraConfig& config) {
   drivers::CameraThreadOptions options{.queue_frames = options_.queue_frames,
                                        .absent = drivers::CameraThreadOptions::Absent::is_looked_for};
+  if (!config.host.empty()) options.reset_ahead = kRemoteAhead;
   if (options_.on_frame) {
     options.on_frame = [show = options_.on_frame, index = cameras_.size()](const Frame& frame) {
       show(index, frame);

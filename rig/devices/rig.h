@@ -30,12 +30,15 @@ struct RigOptions {
   /// called on the camera's own thread, so it must be thread-safe and return at once.
   std::function<void(std::size_t camera, const Frame&)> on_frame = {};
   std::span<const drivers::CameraDriver> drivers = camera_drivers();
+  /// Opens a camera of driver "remote": the daemon's business. Absent: there are none.
+  std::function<std::unique_ptr<drivers::Camera>(const CameraConfig& config, drivers::CameraInfo expected)>
+      remote = {};
 };
 
 /// The configured cameras and strobe. In real time every camera has its own thread (drivers/camera_thread.h);
 /// an absent camera counts as lost and is searched for. A rig whose cameras are all virtual and fast, or all
 /// recorded with the strobe, runs on its own clock and on the owner's thread only, and is deterministic.
-/// Cameras are in the order of the configuration. One owner thread, except for state(), trouble() and
+/// Cameras are in the order of the configuration, other hosts' behind this one's. One owner thread, except for state(), trouble() and
 /// counts().
 class Rig {
  public:
@@ -53,9 +56,13 @@ class Rig {
 
   [[nodiscard]] Pace pace() const { return pace_; }
   [[nodiscard]] std::size_t size() const { return cameras_.size(); }
+  /// The first so many cameras are this host's, the others are other hosts'.
+  [[nodiscard]] std::size_t own() const { return own_; }
   [[nodiscard]] drivers::Camera& camera(std::size_t index) { return *cameras_.at(index).camera; }
   /// "virtual", "v4l2", ...
   [[nodiscard]] std::string_view driver(std::size_t index) const { return cameras_.at(index).driver; }
+  /// HOST:PORT of the host that has the camera; empty: this one.
+  [[nodiscard]] const std::string& host(std::size_t index) const { return cameras_.at(index).config.host; }
   /// Null if the rig has none.
   [[nodiscard]] drivers::Strobe* strobe() { return strobe_; }
   [[nodiscard]] Clock& clock() { return *clock_; }
@@ -102,8 +109,11 @@ class Rig {
   Status open_replay(const RigConfig& config);
   Status open_strobe(const RigConfig& config);
   Status add_real(const CameraConfig& config, Hertz rate);
+  Status add_remote(const CameraConfig& config, Hertz rate);
   Status add_recorded(const CameraConfig& config);
   void add(std::unique_ptr<drivers::Camera> camera, std::string_view driver, const CameraConfig& config);
+  /// Of a remote camera, a reset's order is on its way for a while.
+  static constexpr Seconds kRemoteAhead = milliseconds(100);
   void add_borrowed(drivers::Camera& camera, std::string_view driver, const CameraConfig& config);
 
   RigOptions options_;
@@ -116,6 +126,7 @@ class Rig {
   std::shared_ptr<ReplayPace> replay_pace_;
   std::unique_ptr<drivers::Strobe> own_strobe_;
   drivers::Strobe* strobe_ = nullptr;
+  std::size_t own_ = 0;
   std::vector<Member> cameras_;  ///< last member: destroyed before what they use
 };
 

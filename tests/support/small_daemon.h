@@ -40,8 +40,10 @@ struct SmallDaemon {
         geometry(rig::Geometry::of(config.rig, *rig).value()),
         reconstruction({}, board, jobs),
         live({.program = "no program"}, board),
+        loan(rig->size()),
         conductor(std::in_place,
-                  daemon::ConductorParts{*rig, geometry, config, store, reconstruction, live, jobs, board},
+                  daemon::ConductorParts{*rig, geometry, config, store, reconstruction, live, loan, hosts,
+                                         jobs, board},
                   std::move(stop)) {}
 
   /// Works until `done`, or for so many slices.
@@ -66,6 +68,8 @@ struct SmallDaemon {
   rig::Geometry geometry;
   daemon::ReconstructionChild reconstruction;
   daemon::LiveVolumes live;
+  daemon::Loan loan;
+  daemon::HostParts hosts;
   daemon::Jobs jobs;
   std::optional<daemon::Conductor> conductor;
   v1::DaemonStatus status;

@@ -1,0 +1,270 @@
+// SPDX-License-Identifier: Apache-2.0
+// Several hosts as one rig: what this one does for a host that leads it, and what it asks of those that it leads.
+#include <algorithm>
+#include <limits>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "base/clock.h"
+#include "daemon/engine/conductor.h"
+#include "daemon/engine/host_evidence.h"
+#include "daemon/engine/words.h"
+#include "drivers/replay/record.h"
+#include "rig/align/decision_proto.h"
+#include "session/files.h"
+#include "session/name.h"
+#include "session/reader.h"
+#include "smear_sync/align/stagger.h"
+
+namespace emberlock::daemon {
+namespace {
+
+/// Staggered cameras' places in the frame period, known to the tolerance that the lock holds.
+void describe_stagger(const rig::Alignment& alignment, v1::Manifest& manifest) {
+  if (!smear::staggered(alignment.cameras())) return;
+  const smear::AlignOptions& options = alignment.options();
+  for (v1::CameraStream& stream : *manifest.mutable_cameras())
+    for (const smear::AlignCamera& camera : alignment.cameras()) {
+      if (camera.id != stream.camera_id()) continue;
+      stream.set_late_s(camera.offset.value());
+      stream.set_late_sigma_s(options.tolerance.in_time(options.row_time).value());
+    }
+}
+
+/// What the leader knows of the cameras, and what the session is.
+void take_from(const v1::Manifest& told, v1::Manifest& manifest) {
+  manifest.set_session_id(told.session_id());
+  manifest.set_created_utc(told.created_utc());
+  manifest.set_led_by(told.led_by());
+  if (told.has_box()) *manifest.mutable_box() = told.box();
+  for (v1::CameraStream& stream : *manifest.mutable_cameras())
+    for (const v1::CameraStream& known : told.cameras()) {
+      if (known.camera_id() != stream.camera_id()) continue;
+      if (known.has_calibration()) *stream.mutable_calibration() = known.calibration();
+      if (known.has_colour()) *stream.mutable_colour() = known.colour();
+      stream.set_late_s(known.late_s());
+      stream.set_late_sigma_s(known.late_sigma_s());
+    }
+}
+
+/// To what instant the frames of each camera reach; 0 where one has none.
+std::int64_t reached(const session::SessionReader& session) {
+  std::int64_t until = std::numeric_limits<std::int64_t>::max();
+  for (std::size_t i = 0; i < session.camera_count(); ++i) {
+    const auto& stamps = session.stamps(i);
+    until = std::min(until, stamps.empty() ? 0 : stamps.back().monotonic_time.ns);
+  }
+  return until;
+}
+
+/// A part that isn't being recorded any more.
+Result<v1::HostPart> finished_part(const std::filesystem::path& folder, const v1::Manifest& manifest) {
+  v1::HostPart part;
+  part.set_session(folder.filename().string());
+  part.set_state(v1::HostPart::RECORDING);
+  if (manifest.state() == v1::Manifest::RECORDING) return part;  // being finished, or salvaged
+  for (const v1::CameraStream& camera : manifest.cameras()) {
+    part.set_frames(part.frames() + camera.counts().recorded());
+    part.set_lost(part.lost() + lost(camera.counts()));
+  }
+  const auto session = session::SessionReader::open(folder);
+  if (session.ok()) part.set_until_ns(reached(*session));
+  const bool salvaged = manifest.state() == v1::Manifest::SALVAGED;
+  part.set_state(salvaged || !session.ok() ? v1::HostPart::SHORT : v1::HostPart::WHOLE);
+  if (salvaged) part.set_why("its emberlockd ended in the midst of it; what had reached the disk was salvaged");
+  if (!session.ok()) part.set_why(session.error().message());
+  return part;
+}
+
+}  // namespace
+
+v1::DecisionEvent part_of(const v1::DecisionEvent& lock, std::size_t first, std::size_t count) {
+  v1::DecisionEvent part = lock;
+  part.clear_cameras();
+  for (std::size_t i = first; i < first + count && i < static_cast<std::size_t>(lock.cameras_size()); ++i)
+    *part.add_cameras() = lock.cameras(static_cast<int>(i));
+  return part;
+}
+
+Status Conductor::check_not_lent() const {
+  const std::string leader = parts_.loan.leader(SteadyClock().now());
+  if (leader.empty()) return {};
+  return Error{ErrorKind::refused, "its cameras are lent to " + leader, "emberlockd",
+               "Align and record there; five seconds after that emberlockd has ended they are this host's again"};
+}
+
+Result<v1::LentCameras> Conductor::lend(const std::string& leader) {
+  const TimePoint now = SteadyClock().now();
+  const bool own_use = parts_.loan.leader(now).empty() && state_.phase != v1::IDLE;
+  if (own_use)
+    return Error{ErrorKind::refused, "it uses its cameras itself", "emberlockd",
+                 "End its alignment and its recording there first"};
+  const bool new_one = parts_.loan.leader(now) != leader;
+  EMBERLOCK_RETURN_IF_ERROR(parts_.loan.take(leader, now));
+  if (new_one) {
+    parts_.board.notice(v1::GREEN, "The cameras are lent to " + leader);
+    set_scene();
+  }
+  v1::LentCameras lent;
+  const auto states = camera_states();
+  for (std::size_t i = 0; i < states.size(); ++i) {
+    v1::LentCameras::Camera& camera = *lent.add_cameras();
+    *camera.mutable_stream() = drivers::to_proto(devices_.cameras[i]->info());
+    camera.set_state(states[i]);
+  }
+  return lent;
+}
+
+Result<std::size_t> Conductor::lent_camera(const std::string& leader, const std::string& camera_id) {
+  EMBERLOCK_RETURN_IF_ERROR(parts_.loan.take(leader, SteadyClock().now()));
+  for (std::size_t i = 0; i < devices_.cameras.size(); ++i) {
+    if (devices_.cameras[i]->info().id != camera_id) continue;
+    if (parts_.rig.state(i) == drivers::CameraThread::State::filming) return i;
+    return Error{ErrorKind::refused, "it doesn't film", "camera " + camera_id, "See to it there"};
+  }
+  return Error{ErrorKind::bad_input, "there is no such camera", "camera " + camera_id,
+               "Name one that `emberlock status` lists there"};
+}
+
+Status Conductor::reset_lent(const v1::ResetRequest& request) {
+  EMBERLOCK_ASSIGN_OR_RETURN(const std::size_t camera, lent_camera(request.leader(), request.camera_id()));
+  return devices_.cameras[camera]->reset_shutter({request.at_ns()});
+}
+
+Status Conductor::trim_lent(const v1::TrimRequest& request) {
+  EMBERLOCK_ASSIGN_OR_RETURN(const std::size_t camera, lent_camera(request.leader(), request.camera_id()));
+  return devices_.cameras[camera]->trim_rate(PartsPerMillion(request.trim_ppm()));
+}
+
+Result<v1::HostPart> Conductor::record_part(const v1::PartRequest& request) {
+  EMBERLOCK_RETURN_IF_ERROR(parts_.loan.take(request.leader(), SteadyClock().now()));
+  // Its answer may have been lost.
+  const bool runs = records_for_another() && part_->manifest().session_id() == request.manifest().session_id();
+  if (!runs) {
+    EMBERLOCK_RETURN_IF_ERROR(session::check_text("purpose", request.manifest().purpose()));
+    EMBERLOCK_ASSIGN_OR_RETURN(const std::filesystem::path folder,
+                               parts_.store.path_for_new(request.name(), wall_clock()));
+    if (recorder_)
+      return Error{ErrorKind::refused, "a recording runs", "emberlockd", "Wait until it has ended"};
+    v1::RecordRequest take;
+    take.set_name(request.name());
+    take.set_purpose(request.manifest().purpose());
+    take.set_seconds(request.seconds());
+    take.set_unlocked(true);  // the leader knows of the lock
+    part_ = request;
+    EMBERLOCK_RETURN_IF_ERROR(begin_take(take, folder));
+  }
+  v1::HostPart part;
+  part.set_session(record_folder_.filename().string());
+  part.set_state(v1::HostPart::RECORDING);
+  return part;
+}
+
+Status Conductor::stop_part(const v1::StopPartRequest& request) {
+  EMBERLOCK_RETURN_IF_ERROR(parts_.loan.take(request.leader(), SteadyClock().now()));
+  const bool runs = records_for_another() && part_->manifest().session_id() == request.session_id() &&
+                    state_.phase == v1::CAPTURING;
+  if (!runs) return {};
+  part_ends_ = TimePoint{request.at_ns()};
+  return happen(AskStopRecording{});
+}
+
+Result<v1::HostPart> Conductor::part(const v1::FindPartRequest& request) {
+  if (records_for_another() && part_->manifest().session_id() == request.session_id()) {
+    v1::HostPart part;
+    part.set_session(record_folder_.filename().string());
+    part.set_state(v1::HostPart::RECORDING);
+    part.set_frames(recorder_->status(parts_.rig.clock().now()).frames());
+    return part;
+  }
+  const Error none{ErrorKind::out_of_data, "it has no part of this session", request.name(), "Look for it there"};
+  const auto folder = parts_.store.path_of(request.name());
+  if (!folder.ok()) return none;
+  const auto manifest = session::read_manifest(*folder);
+  if (!manifest.ok()) return manifest.error();
+  if (manifest->session_id() != request.session_id()) return none;
+  return finished_part(*folder, *manifest);
+}
+
+v1::Manifest Conductor::describe_take() const {
+  v1::Manifest manifest;
+  manifest.set_session_id(state_.session);
+  manifest.set_created_utc(utc_now());
+  manifest.set_purpose(record_request_.purpose().empty() ? "flame" : record_request_.purpose());
+  parts_.geometry.describe(parts_.rig, manifest);
+  if (alignment_ && state_.lock == Lock::held) describe_stagger(*alignment_, manifest);
+  // By which its parts are found, wherever they lie.
+  if (parts_.hosts.any())
+    manifest.set_session_id(fmt::format("{} {}", manifest.session_id(), manifest.created_utc()));
+  if (part_) take_from(part_->manifest(), manifest);
+  return manifest;
+}
+
+std::optional<v1::DecisionEvent> Conductor::lock_evidence() const {
+  if (part_) return part_->has_lock() ? std::optional(part_->lock()) : std::nullopt;
+  if (!alignment_ || state_.lock != Lock::held) return std::nullopt;
+  return rig::lock_evidence(*alignment_, parts_.rig.clock().now());
+}
+
+std::vector<v1::PartRequest> Conductor::part_requests(v1::Manifest& manifest,
+                                                      const std::optional<v1::DecisionEvent>& lock) const {
+  std::vector<v1::PartRequest> requests;
+  const std::size_t own = parts_.rig.own();
+  for (const std::string& host : parts_.hosts.addresses()) {
+    v1::PartRequest& request = requests.emplace_back();
+    v1::HostPart& part = *manifest.add_hosts();
+    part.set_host(host);
+    part.set_session(state_.session);
+    part.set_state(v1::HostPart::RECORDING);
+    v1::Manifest& told = *request.mutable_manifest();
+    told.set_session_id(manifest.session_id());
+    told.set_created_utc(manifest.created_utc());
+    told.set_purpose(manifest.purpose());
+    told.set_led_by(parts_.hosts.leader());
+    if (manifest.has_box()) *told.mutable_box() = manifest.box();
+    if (lock) *request.mutable_lock() = part_of(*lock, 0, 0);
+    for (std::size_t i = own; i < parts_.rig.size(); ++i) {
+      if (parts_.rig.host(i) != host) continue;
+      const v1::CameraStream& camera = manifest.cameras(static_cast<int>(i));
+      *told.add_cameras() = camera;
+      part.add_camera_ids(camera.camera_id());
+      if (lock && i < static_cast<std::size_t>(lock->cameras_size()))
+        *request.mutable_lock()->add_cameras() = lock->cameras(static_cast<int>(i));
+    }
+    request.set_from_ns(record_began_.ns);
+    request.set_seconds(record_request_.seconds());
+    request.set_alone_s(parts_.config.hosts.alone.value());
+  }
+  while (manifest.cameras_size() > static_cast<int>(own)) manifest.mutable_cameras()->RemoveLast();
+  return requests;
+}
+
+void Conductor::watch_hosts() {
+  for (const PartNews& news : parts_.hosts.news()) {
+    const FaultKey key{v1::Fault::PART_WANTING, news.session + " at " + news.part.host()};
+    const bool wanting =
+        news.part.state() == v1::HostPart::MISSING || news.part.state() == v1::HostPart::SHORT;
+    if (wanting) {
+      static_cast<void>(happen(FaultRaised{key, v1::AMBER, HostPartIs{news.part}}));
+    } else {
+      static_cast<void>(happen(FaultMended{key}));
+      if (news.part.state() == v1::HostPart::WHOLE)
+        note({v1::GREEN, Remark::Code::part_known, news.session, HostPartIs{news.part}});
+    }
+  }
+}
+
+void Conductor::describe_hosts(v1::DaemonStatus& status) const {
+  status.set_lent_to(parts_.loan.leader(SteadyClock().now()));
+  for (v1::HostStatus& host : parts_.hosts.hosts()) {
+    for (std::size_t i = parts_.rig.own(); i < parts_.rig.size(); ++i)
+      if (parts_.rig.host(i) == host.host()) host.set_cameras(host.cameras() + 1);
+    *status.add_hosts() = std::move(host);
+  }
+  if (!status.has_recording() || !parts_.hosts.any()) return;
+  for (v1::HostPart& part : parts_.hosts.of(record_folder_))
+    *status.mutable_recording()->add_hosts() = std::move(part);
+}
+
+}  // namespace emberlock::daemon

@@ -112,6 +112,10 @@ Status check(const VirtualRigOptions& options) {
     EMBERLOCK_RETURN_IF_ERROR(check(dial->dial));
     EMBERLOCK_RETURN_IF_ERROR(in_range(where, "strobe.dial.error", dial->error.value(), -200e3, 200e3));
     EMBERLOCK_RETURN_IF_ERROR(in_range(where, "strobe.dial.width", dial->width.value(), 1e-6, 1e-3));
+    if (options.light) {
+      return Error{ErrorKind::bad_input, "a strobe that is set by hand is not shared", where,
+                   "leave out light or strobe.dial"};
+    }
   }
   EMBERLOCK_RETURN_IF_ERROR(check(options.scene));
   std::set<std::string_view> ids;

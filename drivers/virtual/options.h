@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <filesystem>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -61,10 +62,17 @@ struct VirtualStrobeOptions {
   std::optional<VirtualDialOptions> dial{};  ///< present: a strobe that is set by hand (virtual_dial.h)
 };
 
+/// One strobe for the rigs of several processes (shared_light.h). Each needs a SteadyClock.
+struct SharedLightOptions {
+  std::filesystem::path file;
+  bool leads = false;  ///< this rig's strobe lights all of them; else the leader's does, and its own none
+};
+
 struct VirtualRigOptions {
   std::uint64_t seed = 1;
   std::vector<VirtualCameraOptions> cameras{};  ///< 1..64
   VirtualStrobeOptions strobe{};
+  std::optional<SharedLightOptions> light{};  ///< not with a dial
   VirtualScene scene = smear_scene();
   int queue_frames = 64;  ///< capacity of each camera's queue, 1..4096; the oldest frames are dropped first
   TimePoint wall_at_zero{946684800'000'000'000};  ///< the wall clock when the rig's clock is 0

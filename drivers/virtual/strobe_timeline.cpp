@@ -21,6 +21,12 @@ void StrobeTimeline::apply(const StrobeSettings& settings, TimePoint at) {
   segments_.push_back(std::move(next));
 }
 
+void StrobeTimeline::restart(PartsPerMillion rate_error) {
+  const std::lock_guard lock(mutex_);
+  rate_error_ = rate_error;
+  segments_.clear();
+}
+
 void StrobeTimeline::add_flashes(const Segment& segment, Seconds zero, Seconds from, Seconds to, Seconds end,
                                  std::vector<LightPulse>& pulses) {
   const StrobeSettings& s = segment.settings;

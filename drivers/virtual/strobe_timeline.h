@@ -31,6 +31,9 @@ class StrobeTimeline {
   /// `at` must not be before that of the last call; `settings` must be valid.
   void apply(const StrobeSettings& settings, TimePoint at);
 
+  /// Forgets all settings: dark until the next apply().
+  void restart(PartsPerMillion rate_error);
+
   /// The light that overlaps [origin + from, origin + to), in order of time; steady light is cut to that
   /// interval.
   [[nodiscard]] std::vector<LightPulse> light(TimePoint origin, Seconds from, Seconds to) const;

@@ -37,11 +37,19 @@ std::string_view model(SensorKind kind) {
 
 }  // namespace
 
-VirtualRoom::VirtualRoom(std::shared_ptr<Clock> clock, PartsPerMillion strobe_error, VirtualScene scene)
+VirtualRoom::VirtualRoom(std::shared_ptr<Clock> clock, const VirtualRigOptions& rig)
     : clock_(std::move(clock)),
-      strobe_(std::make_shared<StrobeTimeline>(strobe_error)),
+      strobe_(std::make_shared<StrobeTimeline>(rig.strobe.rate_error)),
       opened_(clock_->now()) {
-  set_scene(std::move(scene));
+  if (rig.light && !rig.light->leads) {
+    follower_ = std::make_unique<LightFollower>(rig.light->file, clock_, strobe_);
+  }
+  set_scene(rig.scene);
+}
+
+std::vector<LightPulse> VirtualRoom::light(TimePoint origin, Seconds from, Seconds to) const {
+  if (follower_) follower_->look();
+  return strobe_->light(origin, from, to);
 }
 
 void VirtualRoom::set_scene(VirtualScene scene) {
@@ -218,7 +226,7 @@ std::shared_ptr<const VirtualScene> VirtualCamera::scene_of(std::uint64_t frame_
 
 std::vector<LightPulse> VirtualCamera::light_on(std::uint64_t frame_id) const {
   const smear::CcdTiming& t = options_.timing;
-  return room_->strobe()->light(read_start(frame_id), -t.frame_period, Rows(t.shifts) * t.row_time);
+  return room_->light(read_start(frame_id), -t.frame_period, Rows(t.shifts) * t.row_time);
 }
 
 Seconds VirtualCamera::exposure(const VirtualScene& scene) const {

@@ -12,6 +12,7 @@
 #include "drivers/virtual/crystal.h"
 #include "drivers/virtual/options.h"
 #include "drivers/virtual/sensor.h"
+#include "drivers/virtual/shared_light.h"
 #include "drivers/virtual/strobe_timeline.h"
 
 namespace emberlock::drivers {
@@ -19,11 +20,13 @@ namespace emberlock::drivers {
 /// State shared by all cameras of a rig. Thread-safe.
 class VirtualRoom {
  public:
-  VirtualRoom(std::shared_ptr<Clock> clock, PartsPerMillion strobe_error, VirtualScene scene);
+  VirtualRoom(std::shared_ptr<Clock> clock, const VirtualRigOptions& rig);
 
   [[nodiscard]] Clock& clock() const { return *clock_; }
   [[nodiscard]] const std::shared_ptr<StrobeTimeline>& strobe() const { return strobe_; }
   [[nodiscard]] TimePoint opened() const { return opened_; }
+  /// What StrobeTimeline::light says, after a look at what another process may have set.
+  [[nodiscard]] std::vector<LightPulse> light(TimePoint origin, Seconds from, Seconds to) const;
   void set_scene(VirtualScene scene);
   /// The scene shown by a frame whose read phase begins at t.
   [[nodiscard]] std::shared_ptr<const VirtualScene> scene_at(TimePoint t) const;
@@ -35,6 +38,7 @@ class VirtualRoom {
   };
   std::shared_ptr<Clock> clock_;
   std::shared_ptr<StrobeTimeline> strobe_;
+  std::unique_ptr<LightFollower> follower_;  // of another process's strobe
   TimePoint opened_;
   mutable std::mutex mutex_;
   std::vector<Change> scenes_;  // in order of time, never empty

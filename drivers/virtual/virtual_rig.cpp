@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "drivers/virtual/shared_light.h"
 #include "drivers/virtual/virtual_camera.h"
 #include "drivers/virtual/virtual_dial.h"
 #include "drivers/virtual/virtual_strobe.h"
@@ -11,14 +12,22 @@
 namespace emberlock::drivers {
 
 struct VirtualRig::Parts {
-  Parts(const VirtualRigOptions& options, const std::shared_ptr<Clock>& clock)
-      : room(std::make_shared<VirtualRoom>(clock, options.strobe.rate_error, options.scene)),
-        strobe(options.strobe, clock, room->strobe()) {
+  Parts(const VirtualRigOptions& options, const std::shared_ptr<Clock>& clock,
+        std::unique_ptr<LightWriter> light)
+      : room(std::make_shared<VirtualRoom>(clock, options)),
+        strobe(options.strobe, clock, own_timeline(options, *room), std::move(light)) {
     if (options.strobe.dial) dial = std::make_unique<VirtualDial>(options.strobe, clock, room->strobe());
     cameras.reserve(options.cameras.size());
     for (const VirtualCameraOptions& camera : options.cameras) {
       cameras.emplace_back(camera, static_cast<int>(cameras.size()), options, room);
     }
+  }
+
+  /// The timeline of the rig's own strobe: no camera sees it where another process's lights the room.
+  static std::shared_ptr<StrobeTimeline> own_timeline(const VirtualRigOptions& options,
+                                                      const VirtualRoom& room) {
+    if (!options.light || options.light->leads) return room.strobe();
+    return std::make_shared<StrobeTimeline>(options.strobe.rate_error);
   }
 
   std::shared_ptr<VirtualRoom> room;
@@ -33,7 +42,13 @@ VirtualRig::~VirtualRig() = default;
 Result<std::unique_ptr<VirtualRig>> VirtualRig::create(const VirtualRigOptions& options,
                                                        const std::shared_ptr<Clock>& clock) {
   EMBERLOCK_RETURN_IF_ERROR(check(options));
-  return std::unique_ptr<VirtualRig>(new VirtualRig(std::make_unique<Parts>(options, clock)));
+  std::unique_ptr<LightWriter> light;
+  if (options.light && options.light->leads) {
+    EMBERLOCK_ASSIGN_OR_RETURN(light,
+                               LightWriter::create(options.light->file, options.strobe.rate_error, clock));
+  }
+  return std::unique_ptr<VirtualRig>(
+      new VirtualRig(std::make_unique<Parts>(options, clock, std::move(light))));
 }
 
 int VirtualRig::size() const { return static_cast<int>(parts_->cameras.size()); }

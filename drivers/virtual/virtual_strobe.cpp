@@ -15,9 +15,11 @@ constexpr Hertz kSlowest{30.0 / 60};
 constexpr Hertz kFastest{20000.0 / 60};
 constexpr std::size_t kLongestCode = 4096;
 
-Status check(const StrobeSettings& s, const std::string& id) {
+}  // namespace
+
+Status check_settings(const StrobeSettings& s, const std::string& where) {
   const auto refuse = [&](std::string what, std::string remedy) {
-    return Error{ErrorKind::bad_input, std::move(what), "strobe " + id, std::move(remedy)};
+    return Error{ErrorKind::bad_input, std::move(what), where, std::move(remedy)};
   };
   // Negated comparisons refuse NaN too.
   if (!(s.rate >= kSlowest && s.rate <= kFastest)) {
@@ -39,14 +41,15 @@ Status check(const StrobeSettings& s, const std::string& id) {
   return {};
 }
 
-}  // namespace
-
 VirtualStrobe::VirtualStrobe(VirtualStrobeOptions options, std::shared_ptr<Clock> clock,
-                             std::shared_ptr<StrobeTimeline> timeline)
-    : options_(std::move(options)), clock_(std::move(clock)), timeline_(std::move(timeline)) {}
+                             std::shared_ptr<StrobeTimeline> timeline, std::unique_ptr<LightWriter> light)
+    : options_(std::move(options)),
+      clock_(std::move(clock)),
+      timeline_(std::move(timeline)),
+      light_(std::move(light)) {}
 
 Status VirtualStrobe::apply(const StrobeSettings& settings) {
-  EMBERLOCK_RETURN_IF_ERROR(check(settings, options_.id));
+  EMBERLOCK_RETURN_IF_ERROR(check_settings(settings, "strobe " + options_.id));
   StrobeSettings rounded = settings;
   // Dividing by the number of steps per second, an integer, keeps multiples of a step exact.
   const double rate_steps = std::round(1 / options_.rate_step.value());
@@ -57,8 +60,13 @@ Status VirtualStrobe::apply(const StrobeSettings& settings) {
       Seconds(std::min(std::round(settings.phase.value() * time_steps), below_period) / time_steps);
   rounded.width =
       Seconds(std::clamp(std::round(settings.width.value() * time_steps), 1.0, below_period) / time_steps);
+  TimePoint at = clock_->now();
+  if (light_) {
+    EMBERLOCK_ASSIGN_OR_RETURN(at, light_->announce(rounded));
+  }
   settings_ = std::move(rounded);
-  timeline_->apply(settings_, clock_->now());
+  timeline_->apply(settings_, at);
+  clock_->sleep_until(at);
   log(LogCategory::drivers).debug("{}: {} flashes a second", options_.id, settings_.rate.value());
   return {};
 }

@@ -77,6 +77,18 @@ void check_camera(const ConfigCheck& t, const CameraConfig& camera, const std::s
   }
 }
 
+void check_light(const ConfigCheck& t) {
+  const RigConfig& rig = t.config.rig;
+  if (rig.virtual_rig.time == VirtualConfig::Time::fast) {
+    t.problem(place(t.root, "rig.virtual.light"), "several daemons share no time that runs faster than real",
+              "say time = \"real\", or leave out light");
+  }
+  if (rig.strobe.source != StrobeSource::virtual_ && rig.strobe.source != StrobeSource::none) {
+    t.problem(place(t.root, "rig.virtual.light"), "only a virtual strobe can be shared",
+              "say driver = \"virtual\" in [rig.strobe], or no strobe to read another daemon's");
+  }
+}
+
 void check_rig(const ConfigCheck& t) {
   const RigConfig& rig = t.config.rig;
   std::set<std::pair<CameraSource, std::string>> ids;
@@ -103,6 +115,7 @@ void check_rig(const ConfigCheck& t) {
     t.problem(place(t.root, "rig.virtual.time"), "real devices don't film faster than real time",
               "say time = \"real\", or take them out of the rig");
   }
+  if (!rig.virtual_rig.light.empty()) check_light(t);
   if (replay && rig.replay_session.empty()) {
     t.problem(place(t.root, "rig.replay"), "there is nothing to replay",
               "say session = \"FOLDER\" in [rig.replay]");

@@ -151,6 +151,7 @@ void anchor(DaemonConfig& config, const std::filesystem::path& folder) {
   };
   from_folder(config.rig.calibration);
   from_folder(config.rig.replay_session);
+  from_folder(config.rig.virtual_rig.light);
   from_folder(config.alignment.delays);
   from_folder(config.recording.folder);
   if (config.reconstruction.program.has_parent_path()) from_folder(config.reconstruction.program);

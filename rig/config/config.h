@@ -57,6 +57,7 @@ struct VirtualConfig {
   enum class Scene { dark_room, lit_room, flame };
   Time time = Time::real;
   Scene scene = Scene::dark_room;
+  std::filesystem::path light;  ///< shared by several daemons (drivers/virtual/shared_light.h); empty: none
   drivers::VirtualRigDraw
       draw{};  ///< except cameras, sensors, layout and rate, which are in the cameras' sections
 };

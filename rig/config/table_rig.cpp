@@ -42,7 +42,11 @@ Section<DaemonConfig> make_virtual_section() {
        number<C>("reset_latency_ms", EMBERLOCK_AT(rig.virtual_rig.draw.reset_latency), {0, 10000, kMilli},
                  "Delay from a reset to the new phase, mean over cameras."),
        number<C>("reset_jitter_ms", EMBERLOCK_AT(rig.virtual_rig.draw.reset_jitter), {0, 1000, kMilli},
-                 "RMS jitter of that delay, for resets on command.")}};
+                 "RMS jitter of that delay, for resets on command."),
+       text<C>("light", EMBERLOCK_AT(rig.virtual_rig.light), kPath,
+               "File through which simulated cameras of several daemons on one machine see one simulated "
+               "strobe. The daemon whose rig has the strobe writes it, the others read it. None if absent.",
+               "\"light.txt\"")}};
 }
 
 Section<DaemonConfig> make_replay_section() {

@@ -53,6 +53,10 @@ Result<drivers::VirtualRigOptions> virtual_setup(const RigConfig& config) {
     rig.strobe.id = "manual";
     rig.strobe.dial = drivers::VirtualDialOptions{.dial = config.strobe.dial};
   }
+  if (!config.virtual_rig.light.empty()) {
+    rig.light =
+        drivers::SharedLightOptions{config.virtual_rig.light, config.strobe.source == StrobeSource::virtual_};
+  }
   switch (config.virtual_rig.scene) {
     case VirtualConfig::Scene::dark_room:
     case VirtualConfig::Scene::flame:

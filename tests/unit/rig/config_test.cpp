@@ -210,6 +210,11 @@ TEST(Config, AKeyThatMeansNothingToACamerasDriverIsAnError) {
               HasSubstr("exposure_ms means nothing here"));
 }
 
+TEST(Config, ThePathOfASharedStrobeStartsFromTheFilesFolder) {
+  EXPECT_EQ(parsed("[rig.virtual]\nlight = \"light.txt\"\n").rig.virtual_rig.light,
+            "/etc/emberlock/light.txt");
+}
+
 TEST(Config, WhatDoesNotFitTogetherIsAnError) {
   EXPECT_THAT(problem("[[rig.camera]]\nid = \"a\"\n"), HasSubstr("lab.toml:1:1: the camera has no driver"));
   EXPECT_THAT(problem("[[rig.camera]]\ndriver = \"v4l2\"\n"), HasSubstr("the camera has no id"));
@@ -222,6 +227,14 @@ TEST(Config, WhatDoesNotFitTogetherIsAnError) {
                       "\"b\"\ncount=5\n"),
               HasSubstr("there are 65 virtual cameras"));
   EXPECT_THAT(problem(one + "[rig.virtual]\ntime = \"fast\"\n"), HasSubstr("lab.toml:5:8: real devices"));
+  const std::string light = "[rig.virtual]\nlight = \"l\"\n";
+  EXPECT_EQ(problem(light), "");
+  EXPECT_EQ(problem(light + "[rig.strobe]\ndriver = \"virtual\"\n"), "");
+  EXPECT_EQ(problem(light + "time = \"fast\"\n"),
+            "lab.toml:2:9: several daemons share no time that runs faster than real. Say time = \"real\", or "
+            "leave out light");
+  EXPECT_THAT(problem(light + "[rig.strobe]\ndriver = \"manual\"\n"),
+              HasSubstr("lab.toml:2:9: only a virtual strobe can be shared"));
   EXPECT_THAT(problem("[[rig.camera]]\ndriver = \"replay\"\n"), HasSubstr("nothing to replay"));
   EXPECT_THAT(problem("[[rig.camera]]\ndriver = \"virtual\"\nrows = 720\nshifts = 700\n"),
               HasSubstr("lab.toml:4:10: shifts are fewer than rows. Give 720 at least"));

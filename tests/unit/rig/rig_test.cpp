@@ -14,6 +14,7 @@
 
 #include "rig/align/alignment.h"
 #include "rig/align/record.h"
+#include "tests/support/recording.h"
 #include "tests/support/small_rig.h"
 #include "tests/support/socket_cameras.h"
 #include "tests/support/wait.h"
@@ -39,6 +40,30 @@ RigConfig fast_rig(int cameras) {
   config.virtual_rig.time = VirtualConfig::Time::fast;
   config.strobe.source = StrobeSource::virtual_;
   return config;
+}
+
+TEST(Rig, OneRigsStrobeLightsTheOthers) {
+  const test::TempFolder folder;
+  RigConfig config;
+  config.cameras = {virtual_cameras(1)};
+  config.virtual_rig.light = folder / "light.txt";
+  const auto follower = Rig::open(config);
+  config.strobe.source = StrobeSource::virtual_;
+  const auto leader = Rig::open(config);
+  ASSERT_TRUE(follower.ok() && leader.ok());
+  const auto dots = [](Rig& rig) {
+    std::size_t count = 0;
+    for (std::uint64_t frame = 0; frame < 10; ++frame) count += rig.virtual_rig()->dots(0, frame).size();
+    return count;
+  };
+  ASSERT_TRUE((*follower)->virtual_rig()->camera(0).start().ok());
+  EXPECT_EQ(dots(**follower), 0U);
+  ASSERT_TRUE((*leader)
+                  ->virtual_rig()
+                  ->strobe()
+                  .apply({.output = drivers::StrobeOutput::flashing, .rate = Hertz(100)})
+                  .ok());
+  EXPECT_GT(dots(**follower), 10U);
 }
 
 TEST(Rig, FastVirtualCamerasAlignOnTheirOwnClock) {

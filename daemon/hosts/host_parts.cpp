@@ -203,25 +203,24 @@ void HostParts::settle(const Take& take, const v1::HostPart& there, Part& part) 
 }
 
 HostParts::Part HostParts::asked(const Take& take, Part part) {
-  using enum v1::HostPart::State;
   if (part.host == nullptr) {
-    set(part.known, MISSING, "its host isn't one of the rig's any more, so it isn't asked");
+    set(part.known, v1::HostPart::MISSING, "its host isn't one of the rig's any more, so it isn't asked");
     return part;
   }
   if (!part.host->connected()) {
-    set(part.known, MISSING, part.host->status().reason());
+    set(part.known, v1::HostPart::MISSING, part.host->status().reason());
     return part;
   }
   const auto there = part.host->part(take.session_id, part.known.session());
   if (!there.ok()) {
-    set(part.known, MISSING, there.error().message());
+    set(part.known, v1::HostPart::MISSING, there.error().message());
   } else if (!*there && !take.ended && part.request) {
     begin(part, take.folder);
   } else if (!*there) {
     part.settled = true;
-    set(part.known, SHORT, "nothing of it was recorded there");
-  } else if ((*there)->state() == RECORDING) {
-    set(part.known, RECORDING, "");
+    set(part.known, v1::HostPart::SHORT, "nothing of it was recorded there");
+  } else if ((*there)->state() == v1::HostPart::RECORDING) {
+    set(part.known, v1::HostPart::RECORDING, "");
     part.known.set_frames((*there)->frames());
     if (take.ended || take.restarted)
       static_cast<void>(part.host->stop_part(take.session_id, part.known.session(),

@@ -70,12 +70,12 @@ class HostParts {
   };
   struct Take {
     std::filesystem::path folder;
-    std::string session_id;
-    std::optional<TimePoint> ended;  ///< on this host's clock
-    bool restarted = false;          ///< emberlockd was, so it doesn't know when it ended
-    bool closed = false;             ///< this host's own part is finished
-    bool behind = false;             ///< the manifest doesn't say what is known
-    std::vector<Part> parts;
+    std::string session_id = {};
+    std::optional<TimePoint> ended = {};  ///< on this host's clock
+    bool restarted = false;               ///< emberlockd was, so it doesn't know when it ended
+    bool closed = false;                  ///< this host's own part is finished
+    bool behind = false;                  ///< the manifest doesn't say what is known
+    std::vector<Part> parts = {};
   };
   void run();
   /// What the part's host says of it, and what is done about that. Without the lock.

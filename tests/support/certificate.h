@@ -24,10 +24,12 @@ class CertificateAuthority {
   }
 
   [[nodiscard]] std::string pem() const { return pem_of(own_.get()); }
-  /// For the DNS name `host`, and this machine's address in numbers if that is "localhost".
+  /// For the DNS name or the address `host`, and this machine's address in numbers if that is "localhost".
   [[nodiscard]] rig::TlsIdentity issue(const std::string& host) const {
     const Key key(EVP_EC_gen("P-256"), EVP_PKEY_free);
-    const std::string names = "DNS:" + host + (host == "localhost" ? ",IP:127.0.0.1" : "");
+    const bool address = host.find_first_not_of("0123456789.") == std::string::npos;
+    const std::string names =
+        (address ? "IP:" : "DNS:") + host + (host == "localhost" ? ",IP:127.0.0.1" : "");
     return {pem_of(make(host, key.get(), {{NID_subject_alt_name, names.c_str()}}).get()), pem_of(key.get())};
   }
 

@@ -1,0 +1,274 @@
+// SPDX-License-Identifier: Apache-2.0
+// Several hosts as one rig: an emberlockd each, in a network namespace of its own and with a clock of its own.
+#include <chrono>
+#include <csignal>
+#include <filesystem>
+#include <fstream>
+#include <memory>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
+
+#include "session/files.h"
+#include "session/reader.h"
+#include "session/verify.h"
+#include "tests/support/certificate.h"
+#include "tests/support/host_network.h"
+#include "tests/support/recording.h"
+#include "tests/support/shell.h"
+
+namespace emberlock {
+namespace {
+
+namespace fs = std::filesystem;
+using ::testing::HasSubstr;
+using ::testing::Not;
+
+constexpr int kCamerasAHost = 2;
+
+void write(const fs::path& file, const std::string& text) {
+  std::ofstream(file) << text;
+  fs::permissions(file, fs::perms::owner_read | fs::perms::owner_write);
+}
+
+/// One host: its network, its clock, its folder, its emberlockd.
+class Host {
+ public:
+  Host(const fs::path& folder, int number, const test::HostNetwork& network,
+       const test::CertificateAuthority& authority)
+      : folder_(folder / ("host-" + std::to_string(number))), number_(number), network_(network) {
+    fs::create_directories(folder_);
+    const rig::TlsIdentity own = authority.issue(test::HostNetwork::address(number));
+    write(folder_ / "host.crt", own.certificate);
+    write(folder_ / "host.key", own.key);
+    write(folder_ / "hosts.crt", authority.pem());
+    text_ = "[rig]\nname = \"dome\"\n[[rig.camera]]\ndriver = \"virtual\"\nid = \"" + camera() +
+            "\"\ncount = 2\nsize = \"160x120\"\n[rig.virtual]\nlight = \"" + (folder / "light").string() +
+            "\"\n[recording]\nfolder = \"" + sessions().string() +
+            "\"\nfree_space_floor_mib = 0\nencoding = \"raw\"\ntranscode = \"never\"\n[server]\nsocket = \"" +
+            (folder_ / "run" / "d.sock").string() +
+            "\"\nhttp_listen = \"\"\n[hosts]\ncertificate = \"host.crt\"\nkey = \"host.key\"\n"
+            "authority = \"hosts.crt\"\n";
+  }
+  Host(const Host&) = delete;
+  Host& operator=(const Host&) = delete;
+  ~Host() { kill(); }
+
+  [[nodiscard]] fs::path sessions() const { return folder_ / "sessions"; }
+  [[nodiscard]] std::string camera() const { return std::string(1, static_cast<char>('a' + number_)); }
+  [[nodiscard]] std::string address() const { return test::HostNetwork::address(number_) + ":7143"; }
+  void lends() { text_ += "listen = \"" + address() + "\"\n"; }
+  void leads(const std::vector<std::unique_ptr<Host>>& others) {
+    text_ += "[rig.strobe]\ndriver = \"virtual\"\n";
+    std::string cameras;
+    for (const auto& other : others)
+      for (int i = 0; i < kCamerasAHost; ++i)
+        cameras += "[[rig.camera]]\ndriver = \"remote\"\nhost = \"" + other->address() + "\"\nid = \"" +
+                   other->camera() + "-0" + std::to_string(i) + "\"\n";
+    const auto at = text_.find("[rig.virtual]");
+    text_.insert(at, cameras);
+  }
+  /// Its monotonic clock is a thousand seconds ahead for each host before it.
+  void start() {
+    write(folder_ / "d.toml", text_);
+    pid_ = ::fork();
+    if (pid_ != 0) return;
+    network_.enter(number_);
+    const std::string ahead = std::to_string(1000 * number_);
+    const std::string config = (folder_ / "d.toml").string();
+    ::execlp("unshare", "unshare", "--time", "--monotonic", ahead.c_str(), "--fork", "--kill-child",
+             EMBERLOCKD_PROGRAM, "--config", config.c_str(), nullptr);
+    ::_exit(127);
+  }
+  void kill() {
+    if (pid_ <= 0) return;
+    ::kill(pid_, SIGKILL);
+    ::waitpid(pid_, nullptr, 0);
+    pid_ = -1;
+  }
+  [[nodiscard]] Shell client(const std::string& words) const {
+    return shell(std::string(EMBERLOCK_PROGRAM) + " " + words +
+                 " --daemon unix:" + (folder_ / "run" / "d.sock").string());
+  }
+  [[nodiscard]] bool answers(const std::string& question, const std::string& words) const {
+    const auto end = std::chrono::steady_clock::now() + std::chrono::minutes(2);
+    while (std::chrono::steady_clock::now() < end) {
+      if (client(question).output.find(words) != std::string::npos) return true;
+      std::this_thread::sleep_for(std::chrono::milliseconds(100));
+    }
+    ADD_FAILURE() << client(question).output;
+    return false;
+  }
+
+ private:
+  fs::path folder_;
+  int number_;
+  const test::HostNetwork& network_;
+  std::string text_;
+  pid_t pid_ = -1;
+};
+
+class Hosts : public ::testing::Test {
+ protected:
+  void begin(int others) {
+    if (::geteuid() != 0) GTEST_SKIP() << "network namespaces need root";
+    network_ = std::make_unique<test::HostNetwork>(others + 1);
+    ASSERT_EQ(network_->trouble(), "");
+    leader_ = std::make_unique<Host>(temp_.path(), 0, *network_, authority_);
+    for (int i = 1; i <= others; ++i) {
+      others_.push_back(std::make_unique<Host>(temp_.path(), i, *network_, authority_));
+      others_.back()->lends();
+    }
+    leader_->leads(others_);
+    leader_->start();  // its strobe's light is there before the others look for it
+    ASSERT_TRUE(leader_->answers("status", "dome"));
+    for (auto& other : others_) other->start();
+    ASSERT_TRUE(all_film());
+  }
+  [[nodiscard]] nlohmann::json status() const {
+    return nlohmann::json::parse(leader_->client("status --json").output, nullptr, false);
+  }
+  [[nodiscard]] bool until(const std::function<bool(const nlohmann::json&)>& holds, int seconds = 120) const {
+    const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(seconds);
+    while (std::chrono::steady_clock::now() < end) {
+      const nlohmann::json now = status();
+      if (now.is_object() && holds(now)) return true;
+      std::this_thread::sleep_for(std::chrono::milliseconds(100));
+    }
+    ADD_FAILURE() << leader_->client("status").output;
+    return false;
+  }
+  [[nodiscard]] bool all_film() const {
+    return until([this](const nlohmann::json& now) {
+      if (now["cameras"].size() != (others_.size() + 1) * kCamerasAHost) return false;
+      for (const auto& camera : now["cameras"])
+        if (camera["state"] != "FILMING") return false;
+      return true;
+    });
+  }
+  [[nodiscard]] v1::Manifest manifest(const Host& host, const std::string& session) const {
+    const auto read = session::read_manifest(host.sessions() / session);
+    EXPECT_TRUE(read.ok()) << (read.ok() ? "" : read.error().message());
+    return read.ok() ? *read : v1::Manifest();
+  }
+
+  test::TempFolder temp_;
+  test::CertificateAuthority authority_{"who signs hosts"};
+  std::unique_ptr<test::HostNetwork> network_;
+  std::unique_ptr<Host> leader_;
+  std::vector<std::unique_ptr<Host>> others_;
+};
+
+TEST_F(Hosts, TwoAreLockedByOneStrobeAndRecordOneSession) {
+  ASSERT_NO_FATAL_FAILURE(begin(1));
+  const Shell align = leader_->client("align --tolerance 60rows");
+  ASSERT_EQ(align.status, 0) << align.output;
+  EXPECT_THAT(others_[0]->client("align").output, HasSubstr("lent to dome at"));
+  EXPECT_THAT(others_[0]->client("record mine --unlocked").output, HasSubstr("lent to dome at"));
+  const Shell record = leader_->client("record take --seconds 2");
+  EXPECT_EQ(record.status, 0) << record.output;
+
+  const v1::Manifest whole = manifest(*leader_, "take");
+  EXPECT_EQ(whole.cameras_size(), kCamerasAHost);
+  ASSERT_EQ(whole.hosts_size(), 1);
+  const v1::HostPart& part = whole.hosts(0);
+  EXPECT_EQ(part.state(), v1::HostPart::WHOLE) << part.why();
+  EXPECT_EQ(part.host(), others_[0]->address());
+  EXPECT_EQ(part.lost(), 0U);
+  EXPECT_NEAR(static_cast<double>(part.frames()), 2 * 48, 4);
+  ASSERT_GE(part.clock_size(), 2);
+  EXPECT_NEAR(1e-9 * static_cast<double>(part.clock(0).ahead_ns()), 1000, 0.02);
+  const v1::Manifest there = manifest(*others_[0], "take");
+  EXPECT_EQ(there.session_id(), whole.session_id());
+  EXPECT_THAT(there.led_by(), HasSubstr("dome at"));
+  for (const Host* host : {leader_.get(), others_[0].get()}) {
+    const auto check = session::verify_session(host->sessions() / "take");
+    ASSERT_TRUE(check.ok()) << check.error().message();
+    EXPECT_TRUE(check->whole()) << check->to_do;
+  }
+}
+
+TEST_F(Hosts, OneThatIsCutOffRecordsOnAndTheSessionIsWholeAfterwards) {
+  ASSERT_NO_FATAL_FAILURE(begin(2));
+  std::thread recording(
+      [this] { static_cast<void>(leader_->client("record take --unlocked --seconds 20")); });
+  ASSERT_TRUE(leader_->answers("status", "recording  take"));
+  std::this_thread::sleep_for(std::chrono::seconds(2));
+  network_->cut_off(1);
+  ASSERT_TRUE(until([](const nlohmann::json& now) {
+    for (const auto& fault : now["faults"])
+      if (fault["kind"] == "PART_WANTING" && !fault.value("over", false)) return true;
+    return false;
+  }));
+  std::this_thread::sleep_for(std::chrono::seconds(10));
+  network_->connect(1);
+  recording.join();
+  ASSERT_TRUE(until([this](const nlohmann::json&) {
+    const v1::Manifest now = manifest(*leader_, "take");
+    return now.hosts_size() == 2 && now.hosts(0).state() == v1::HostPart::WHOLE &&
+           now.hosts(1).state() == v1::HostPart::WHOLE;
+  }));
+  const v1::Manifest whole = manifest(*leader_, "take");
+  for (const v1::HostPart& part : whole.hosts()) {
+    EXPECT_EQ(part.lost(), 0U) << part.host();
+    EXPECT_NEAR(static_cast<double>(part.frames()), 20 * 48, 10) << part.host();
+  }
+}
+
+TEST_F(Hosts, OneThatIsKilledHasWhatItHadAndTheLeaderSaysSo) {
+  ASSERT_NO_FATAL_FAILURE(begin(1));
+  std::thread recording([this] { static_cast<void>(leader_->client("record take --unlocked --seconds 8")); });
+  ASSERT_TRUE(leader_->answers("status", "recording  take"));
+  std::this_thread::sleep_for(std::chrono::seconds(3));
+  others_[0]->kill();
+  others_[0]->start();
+  recording.join();
+  ASSERT_TRUE(until([this](const nlohmann::json&) {
+    const v1::Manifest now = manifest(*leader_, "take");
+    return now.hosts_size() == 1 && now.hosts(0).state() == v1::HostPart::SHORT;
+  }));
+  const v1::HostPart part = manifest(*leader_, "take").hosts(0);
+  EXPECT_THAT(part.why(), HasSubstr("salvaged"));
+  EXPECT_GT(part.frames(), 24U);
+  EXPECT_TRUE(all_film()) << "it is taken up again";
+  EXPECT_EQ(leader_->client("align --tolerance 60rows").status, 0);
+}
+
+TEST_F(Hosts, ALeaderThatIsKilledFindsThePartsWhenItIsBack) {
+  ASSERT_NO_FATAL_FAILURE(begin(1));
+  std::thread recording([this] { static_cast<void>(leader_->client("record take --unlocked")); });
+  ASSERT_TRUE(leader_->answers("status", "recording  take"));
+  std::this_thread::sleep_for(std::chrono::seconds(2));
+  leader_->kill();
+  recording.join();
+  leader_->start();
+  ASSERT_TRUE(until([this](const nlohmann::json&) {
+    const v1::Manifest now = manifest(*leader_, "take");
+    return now.hosts_size() == 1 && now.hosts(0).state() == v1::HostPart::WHOLE;
+  }));
+  EXPECT_EQ(manifest(*leader_, "take").state(), v1::Manifest::SALVAGED);
+  EXPECT_GT(manifest(*leader_, "take").hosts(0).frames(), 48U);
+}
+
+TEST_F(Hosts, WhoHasNoCertificateOfTheirsIsntLetIn) {
+  ASSERT_NO_FATAL_FAILURE(begin(1));
+  const test::CertificateAuthority foreign("somebody else");
+  const rig::TlsIdentity stranger = foreign.issue(test::HostNetwork::address(0));
+  const fs::path folder = temp_ / "host-0";
+  write(folder / "host.crt", stranger.certificate);
+  write(folder / "host.key", stranger.key);
+  leader_->kill();
+  leader_->start();
+  EXPECT_TRUE(until([](const nlohmann::json& now) {
+    return now.contains("hosts") && now["hosts"].size() == 1 && !now["hosts"][0].value("connected", false) &&
+           now["cameras"][2]["state"] == "LOST";
+  }));
+  EXPECT_THAT(others_[0]->client("status").output, Not(HasSubstr("lent to")));
+}
+
+}  // namespace
+}  // namespace emberlock

@@ -1,0 +1,354 @@
+// SPDX-License-Identifier: Apache-2.0
+// A leading host and one that lends, over TLS on this machine: cameras, parts of recordings.
+#include <chrono>
+#include <filesystem>
+#include <fstream>
+#include <mutex>
+#include <thread>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "daemon/hosts/host_parts.h"
+#include "daemon/hosts/lending_server.h"
+#include "daemon/hosts/remote_camera.h"
+#include "drivers/replay/record.h"
+#include "session/files.h"
+#include "tests/support/certificate.h"
+#include "tests/support/recording.h"
+#include "tests/support/wait.h"
+
+namespace emberlock::daemon {
+namespace {
+
+namespace fs = std::filesystem;
+using test::wait_until;
+using ::testing::HasSubstr;
+
+constexpr ImageLayout kLentLayout{{16, 8}, PixelFormat::gray8, 8};
+
+Frame lent_frame(std::uint64_t id) {
+  return {{.frame_id = id,
+           .device_time = {},
+           .system_time = {},
+           .monotonic_time = SteadyClock().now()},
+          std::make_shared<Image>(kLentLayout)};
+}
+
+/// A host with one camera, "cam", that does what it is told.
+class FakeLender final : public Lender {
+ public:
+  Result<v1::LentCameras> lend(const std::string& leader) override {
+    const std::lock_guard lock(mutex);
+    asked_by = leader;
+    v1::LentCameras cameras;
+    v1::LentCameras::Camera& camera = *cameras.add_cameras();
+    *camera.mutable_stream() = drivers::to_proto({.id = "cam",
+                                                  .model = "a model",
+                                                  .layout = kLentLayout,
+                                                  .frame_rate = Hertz(24),
+                                                  .reset = ShutterReset::on_command});
+    camera.set_state(films ? v1::CameraStatus::FILMING : v1::CameraStatus::LOST);
+    return cameras;
+  }
+  void hear(const std::string& /*leader*/) override {}
+  Result<std::shared_ptr<LentFrames>> watch(const v1::FramesRequest& /*request*/) override {
+    return loan.watch(0);
+  }
+  Status reset(const v1::ResetRequest& request) override {
+    const std::lock_guard lock(mutex);
+    resets.push_back(request);
+    return {};
+  }
+  Status trim(const v1::TrimRequest& request) override {
+    const std::lock_guard lock(mutex);
+    trim_ppm = request.trim_ppm();
+    return {};
+  }
+  Result<v1::HostPart> record_part(const v1::PartRequest& request) override {
+    const std::lock_guard lock(mutex);
+    if (refuses) return Error{ErrorKind::refused, "its disk is full", "emberlockd", "Free space"};
+    recorded = request;
+    part_now.set_session(request.name());
+    part_now.set_state(v1::HostPart::RECORDING);
+    return part_now;
+  }
+  Status stop_part(const v1::StopPartRequest& request) override {
+    const std::lock_guard lock(mutex);
+    stopped = request;
+    part_now.set_state(v1::HostPart::WHOLE);
+    part_now.set_frames(240);
+    part_now.set_until_ns(request.at_ns() - early_ns);
+    return {};
+  }
+  Result<v1::HostPart> part(const v1::FindPartRequest& request) override {
+    const std::lock_guard lock(mutex);
+    if (!recorded || recorded->manifest().session_id() != request.session_id())
+      return Error{ErrorKind::out_of_data, "it has none"};
+    return part_now;
+  }
+
+  std::mutex mutex;
+  std::string asked_by;
+  bool films = true;
+  bool refuses = false;
+  Loan loan{1};
+  std::vector<v1::ResetRequest> resets;
+  double trim_ppm = 0;
+  std::optional<v1::PartRequest> recorded;
+  std::optional<v1::StopPartRequest> stopped;
+  std::int64_t early_ns = 0;
+  v1::HostPart part_now;
+};
+
+class RemoteHostTest : public ::testing::Test {
+ protected:
+  RemoteHostTest() {
+    write("authority.crt", authority.pem());
+    const rig::TlsIdentity own = authority.issue("localhost");
+    write("host.crt", own.certificate);
+    write("host.key", own.key);
+    config.certificate = temp / "host.crt";
+    config.key = temp / "host.key";
+    config.authority = temp / "authority.crt";
+    config.listen = "127.0.0.1:0";
+    serve();
+  }
+  void write(const std::string& name, const std::string& text) {
+    std::ofstream(temp / name) << text;
+    fs::permissions(temp / name, fs::perms::owner_read | fs::perms::owner_write);
+  }
+  void serve() {
+    auto started = LendingServer::start(lender, config);
+    ASSERT_TRUE(started.ok()) << started.error().message();
+    server = std::move(*started);
+    config.listen = "127.0.0.1:" + std::to_string(server->port());
+  }
+  std::shared_ptr<RemoteHost> reach(const rig::HostsConfig& as) {
+    auto channel = channel_to(config.listen, as);
+    EXPECT_TRUE(channel.ok()) << channel.error().message();
+    return std::make_shared<RemoteHost>(config.listen, "dome at here", *channel);
+  }
+  std::shared_ptr<RemoteHost> reach() {
+    auto host = reach(config);
+    EXPECT_TRUE(wait_until([&] { return host->connected(); }));
+    return host;
+  }
+  std::unique_ptr<RemoteCamera> camera(const std::shared_ptr<RemoteHost>& host) {
+    return std::make_unique<RemoteCamera>(
+        host, drivers::CameraInfo{.id = "cam", .model = "", .layout = {}, .frame_rate = Hertz(24)});
+  }
+  /// Until the camera has it: a watch begins when its call has arrived.
+  Result<Frame> send(drivers::Camera& to, std::uint64_t id, const drivers::FrameCounts& counts = {}) {
+    Result<Frame> frame = Error{ErrorKind::timed_out, "none yet"};
+    for (int i = 0; i < 500 && !frame.ok(); ++i) {
+      lender.loan.offer(0, lent_frame(id), counts, Seconds(0));
+      frame = to.next_frame(milliseconds(20));
+    }
+    return frame;
+  }
+
+  test::TempFolder temp;
+  test::CertificateAuthority authority{"who signs hosts"};
+  rig::HostsConfig config;
+  FakeLender lender;
+  std::unique_ptr<LendingServer> server;
+};
+
+TEST_F(RemoteHostTest, ItsClockAndItsLightAreKnown) {
+  const auto host = reach();
+  const v1::HostStatus status = host->status();
+  EXPECT_EQ(status.light(), v1::GREEN);
+  ASSERT_TRUE(status.has_clock_ahead_s());
+  EXPECT_LE(std::abs(status.clock_ahead_s()), status.clock_sigma_s() + 1e-6) << "it is the same clock";
+  EXPECT_GT(status.round_trip_s(), 0);
+}
+
+TEST_F(RemoteHostTest, WithoutACertificateOfTheHostsNobodyIsLetIn) {
+  const test::CertificateAuthority foreign("somebody else");
+  const rig::TlsIdentity stranger = foreign.issue("localhost");
+  write("stranger.crt", stranger.certificate);
+  write("stranger.key", stranger.key);
+  rig::HostsConfig as = config;
+  as.certificate = temp / "stranger.crt";
+  as.key = temp / "stranger.key";
+  const auto host = reach(as);
+  EXPECT_FALSE(host->borrow().ok());
+  EXPECT_FALSE(host->connected());
+  EXPECT_EQ(host->status().light(), v1::RED);
+  EXPECT_EQ(lender.asked_by, "");
+}
+
+TEST_F(RemoteHostTest, ACameraFilmsFromAfar) {
+  const auto host = reach();
+  const auto cam = camera(host);
+  ASSERT_TRUE(cam->start().ok());
+  EXPECT_EQ(lender.asked_by, "dome at here");
+  EXPECT_EQ(cam->info().model, "a model");
+  EXPECT_EQ(cam->info().layout, kLentLayout);
+  const auto frame = send(*cam, 7);
+  ASSERT_TRUE(frame.ok()) << frame.error().message();
+  EXPECT_EQ(frame->stamp.frame_id, 7U);
+  EXPECT_EQ(frame->image->layout(), kLentLayout);
+  EXPECT_LE(abs(frame->stamp.monotonic_time - SteadyClock().now()), Seconds(10));
+}
+
+TEST_F(RemoteHostTest, OfFramesThatWerentSentTheCountsAreRight) {
+  const auto host = reach();
+  const auto cam = camera(host);
+  ASSERT_TRUE(cam->start().ok());
+  ASSERT_TRUE(send(*cam, 1, {.delivered = 100}).ok());
+  while (cam->next_frame(milliseconds(20)).ok()) {
+  }
+  const drivers::FrameCounts before = cam->counts();
+  lender.loan.offer(0, lent_frame(2), {.delivered = 110, .transport = 3}, Seconds(0));
+  ASSERT_TRUE(cam->next_frame(Seconds(5)).ok());
+  const drivers::FrameCounts since = cam->counts() - before;
+  EXPECT_EQ(since.delivered, 1U);
+  EXPECT_EQ(since.passed_over, 9U);
+  EXPECT_EQ(since.transport, 3U);
+}
+
+TEST_F(RemoteHostTest, AResetGoesThereAndEarlierFramesAreDropped) {
+  const auto host = reach();
+  const auto cam = camera(host);
+  ASSERT_TRUE(cam->start().ok());
+  ASSERT_TRUE(send(*cam, 1).ok());
+  const TimePoint at = SteadyClock().now() + milliseconds(150);
+  ASSERT_TRUE(cam->reset_shutter(at).ok());
+  ASSERT_EQ(lender.resets.size(), 1U);
+  EXPECT_NEAR(1e-9 * static_cast<double>(lender.resets[0].at_ns() - at.ns), 0, 0.05);
+  lender.loan.offer(0, lent_frame(2), {}, Seconds(0));
+  EXPECT_EQ(cam->next_frame(milliseconds(50)).error().kind, ErrorKind::timed_out);
+  SteadyClock().sleep_until(at + milliseconds(100));
+  EXPECT_EQ(send(*cam, 3)->stamp.frame_id, 3U);
+  ASSERT_TRUE(cam->trim_rate(PartsPerMillion(12)).ok());
+  EXPECT_EQ(lender.trim_ppm, 12);
+}
+
+TEST_F(RemoteHostTest, ACamerasErrorThereIsOneHere) {
+  const auto host = reach();
+  const auto cam = camera(host);
+  ASSERT_TRUE(cam->start().ok());
+  ASSERT_TRUE(send(*cam, 1).ok());
+  lender.loan.fail(0, {ErrorKind::device, "it was unplugged", "camera cam", "Plug it in"});
+  Result<Frame> next = cam->next_frame(Seconds(5));
+  while (next.ok()) next = cam->next_frame(Seconds(5));
+  EXPECT_EQ(next.error().kind, ErrorKind::device);
+  EXPECT_THAT(next.error().message(), HasSubstr("unplugged"));
+  lender.films = false;
+  EXPECT_THAT(cam->start().error().message(), HasSubstr("doesn't film"));
+  lender.films = true;
+  EXPECT_TRUE(cam->start().ok());
+}
+
+TEST_F(RemoteHostTest, AHostThatIsGoneIsAnErrorWithinSecondsAndTakenUpAgain) {
+  const auto host = reach();
+  const auto cam = camera(host);
+  ASSERT_TRUE(cam->start().ok());
+  ASSERT_TRUE(send(*cam, 1).ok());
+  server.reset();
+  Result<Frame> next = cam->next_frame(Seconds(5));
+  while (next.ok() || next.error().kind == ErrorKind::timed_out) next = cam->next_frame(milliseconds(100));
+  EXPECT_EQ(next.error().kind, ErrorKind::device);
+  ASSERT_TRUE(wait_until([&] { return !host->connected(); }));
+  EXPECT_EQ(cam->start().error().kind, ErrorKind::device);
+  serve();
+  ASSERT_TRUE(wait_until([&] { return host->connected(); }));
+  EXPECT_TRUE(cam->start().ok());
+  EXPECT_TRUE(send(*cam, 2).ok());
+}
+
+class HostPartsTest : public RemoteHostTest {
+ protected:
+  HostPartsTest() : folder(temp / "take") {
+    test::record(folder, kLentLayout, 5, test::small_disk_options(session::Encoding::raw_nut));
+    const auto manifest = session::read_manifest(folder);
+    request.mutable_manifest()->set_session_id(manifest->session_id());
+    request.mutable_manifest()->add_cameras()->set_camera_id("cam");
+    request.set_from_ns(SteadyClock().now().ns);
+  }
+  [[nodiscard]] v1::HostPart kept() const { return session::read_manifest(folder)->hosts(0); }
+  static bool any_news(HostParts& parts, v1::HostPart::State state) {
+    return wait_until([&] {
+      for (const PartNews& news : parts.news())
+        if (news.part.state() == state) return true;
+      return false;
+    });
+  }
+
+  fs::path folder;
+  v1::PartRequest request;
+};
+
+TEST_F(HostPartsTest, APartIsBegunEndedAndKnownToBeWhole) {
+  HostParts parts({reach()}, "dome at here");
+  const auto begun = parts.begin(folder, {request});
+  ASSERT_EQ(begun.size(), 1U);
+  EXPECT_EQ(begun[0].state(), v1::HostPart::RECORDING) << begun[0].why();
+  ASSERT_TRUE(lender.recorded);
+  EXPECT_EQ(lender.recorded->name(), "take");
+  EXPECT_EQ(lender.recorded->leader(), "dome at here");
+  parts.end(folder, SteadyClock().now());
+  ASSERT_TRUE(parts.close(folder, Seconds(10)).ok());
+  EXPECT_EQ(kept().state(), v1::HostPart::WHOLE) << kept().why();
+  EXPECT_EQ(kept().frames(), 240U);
+  EXPECT_EQ(kept().clock_size(), 2);
+  EXPECT_TRUE(any_news(parts, v1::HostPart::WHOLE));
+  EXPECT_TRUE(wait_until([&] { return parts.of(folder).empty(); })) << "nothing more is asked";
+}
+
+TEST_F(HostPartsTest, OneThatEndsEarlyIsShort) {
+  lender.early_ns = 3'000'000'000;
+  HostParts parts({reach()});
+  static_cast<void>(parts.begin(folder, {request}));
+  parts.end(folder, SteadyClock().now());
+  ASSERT_TRUE(parts.close(folder, Seconds(10)).ok());
+  EXPECT_EQ(kept().state(), v1::HostPart::SHORT);
+  EXPECT_THAT(kept().why(), HasSubstr("3.0 s before"));
+}
+
+TEST_F(HostPartsTest, OneThatCantBeginIsMissingAndBeginsWhenItCan) {
+  lender.refuses = true;
+  HostParts parts({reach()});
+  const auto begun = parts.begin(folder, {request});
+  EXPECT_EQ(begun[0].state(), v1::HostPart::MISSING);
+  EXPECT_THAT(begun[0].why(), HasSubstr("its disk is full"));
+  EXPECT_EQ(parts.hosts()[0].parts_wanting(), 1U);
+  EXPECT_TRUE(any_news(parts, v1::HostPart::MISSING));
+  {
+    const std::lock_guard lock(lender.mutex);
+    lender.refuses = false;
+  }
+  EXPECT_TRUE(any_news(parts, v1::HostPart::RECORDING));
+}
+
+TEST_F(HostPartsTest, OneWhoseHostIsAwayIsMissingAndKnownWhenItIsBack) {
+  auto parts = std::make_unique<HostParts>(HostParts::Hosts{reach()});
+  static_cast<void>(parts->begin(folder, {request}));
+  server.reset();
+  parts->end(folder, SteadyClock().now());
+  ASSERT_TRUE(any_news(*parts, v1::HostPart::MISSING));
+  ASSERT_TRUE(parts->close(folder, Seconds(10)).ok());
+  EXPECT_EQ(kept().state(), v1::HostPart::MISSING);
+  EXPECT_THAT(kept().why(), HasSubstr("doesn't answer"));
+  // emberlockd is restarted meanwhile.
+  parts = std::make_unique<HostParts>(HostParts::Hosts{reach(config)});
+  parts->take_up({folder});
+  serve();
+  ASSERT_TRUE(wait_until([&] { return kept().state() == v1::HostPart::WHOLE; })) << kept().why();
+  EXPECT_TRUE(any_news(*parts, v1::HostPart::WHOLE));
+}
+
+TEST_F(HostPartsTest, WhatIsWholeIsntAskedForAgain) {
+  HostParts parts({reach()});
+  static_cast<void>(parts.begin(folder, {request}));
+  parts.end(folder, SteadyClock().now());
+  ASSERT_TRUE(parts.close(folder, Seconds(10)).ok());
+  HostParts again({reach()});
+  again.take_up({folder, temp / "no session"});
+  EXPECT_TRUE(again.of(folder).empty());
+}
+
+}  // namespace
+}  // namespace emberlock::daemon

@@ -24,11 +24,10 @@ std::int64_t difference(std::int64_t a, std::int64_t b) {
   return a < b ? std::numeric_limits<std::int64_t>::min() : std::numeric_limits<std::int64_t>::max();
 }
 
-TimePoint shown(const v1::ClockReading& reading) { return {reading.at_ns() + reading.ahead_ns()}; }
+TimePoint host_time_of(const v1::ClockReading& reading) { return {reading.at_ns() + reading.ahead_ns()}; }
 
 Error wrong_clock(const std::string& where, std::string what) {
-  return {ErrorKind::bad_input, std::move(what), where + ", field clock",
-          "Mend the readings"};
+  return {ErrorKind::bad_input, std::move(what), where + ", field clock", "Mend the readings"};
 }
 
 }  // namespace
@@ -40,7 +39,7 @@ Result<HostClock> HostClock::of(const ClockReadings& readings, const std::string
     if (!is_near(reading.at_ns()) || !is_near(reading.ahead_ns()) || !is_near(reading.sigma_ns()) ||
         reading.sigma_ns() < 0)
       return wrong_clock(where, fmt::format("reading {} isn't of any clock", i));
-    read.push_back({shown(reading), reading.ahead_ns(), 0});
+    read.push_back({host_time_of(reading), reading.ahead_ns(), 0});
     if (i == 0) continue;
     const v1::ClockReading& before = readings[i - 1];
     Reading& last = read[read.size() - 2];
@@ -49,14 +48,14 @@ Result<HostClock> HostClock::of(const ClockReadings& readings, const std::string
     if (passed <= 0 || showed <= 0)
       return wrong_clock(where, fmt::format("reading {} isn't later than the one before", i));
     const std::int64_t gained = reading.ahead_ns() - before.ahead_ns();
-    const double certain = std::abs(static_cast<double>(gained)) -
-                           static_cast<double>(reading.sigma_ns() + before.sigma_ns());
+    const double certain =
+        std::abs(static_cast<double>(gained)) - static_cast<double>(reading.sigma_ns() + before.sigma_ns());
     if (certain > kWildestPpm * 1e-6 * static_cast<double>(passed))
-      return wrong_clock(where, fmt::format("from reading {} to {} it goes wrong by {:.0f} ppm; {:.0f} would "
-                                            "be far off",
-                                            i - 1, i,
-                                            1e6 * static_cast<double>(gained) / static_cast<double>(passed),
-                                            kWildestPpm));
+      return wrong_clock(
+          where, fmt::format("from reading {} to {} it goes wrong by {:.0f} ppm; {:.0f} would "
+                             "be far off",
+                             i - 1, i, 1e6 * static_cast<double>(gained) / static_cast<double>(passed),
+                             kWildestPpm));
     last.rate = static_cast<double>(gained) / static_cast<double>(showed);
     read.back().rate = last.rate;
   }

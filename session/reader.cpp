@@ -65,8 +65,8 @@ Result<SessionReader> SessionReader::follow(const fs::path& folder) {
   for (const v1::CameraStream& camera : reader.manifest_.cameras()) {
     EMBERLOCK_ASSIGN_OR_RETURN(const ImageLayout layout, layout_of(camera));
     EMBERLOCK_ASSIGN_OR_RETURN(const HostClock clock, clock_of(camera, manifest_path(folder).string()));
-    reader.cameras_.push_back(
-        std::make_unique<CameraReader>(folder, camera.camera_id(), layout, std::vector<IndexRecord>(), clock));
+    reader.cameras_.push_back(std::make_unique<CameraReader>(folder, camera.camera_id(), layout,
+                                                             std::vector<IndexRecord>(), clock));
   }
   return reader;
 }

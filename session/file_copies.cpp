@@ -19,9 +19,7 @@ namespace emberlock::session {
 namespace fs = std::filesystem;
 namespace {
 
-std::int64_t ns_of(const timespec& time) {
-  return std::int64_t{time.tv_sec} * 1'000'000'000 + time.tv_nsec;
-}
+std::int64_t ns_of(const timespec& time) { return std::int64_t{time.tv_sec} * 1'000'000'000 + time.tv_nsec; }
 
 /// By how much the file system of a copy may have rounded its time: whole steps of 2 s (FAT), 10 ms (exFAT),
 /// 100 ns (NTFS).
@@ -120,15 +118,14 @@ Status FileCopier::compare(const fs::path& from, const fs::path& to, CopyTally& 
     if (left != right) {
       const auto same = static_cast<std::uint64_t>(
           std::mismatch(left.begin(), left.end(), right.begin(), right.end()).first - left.begin());
-      return Error{ErrorKind::bad_input,
-                   fmt::format("differs from {} at byte {}", from.string(), at + same), to.string()};
+      return Error{ErrorKind::bad_input, fmt::format("differs from {} at byte {}", from.string(), at + same),
+                   to.string()};
     }
     if (left.empty()) return {};
     at += left.size();
     EMBERLOCK_RETURN_IF_ERROR(tally.add(left.size(), from.filename().string()));
   }
 }
-
 
 Status copy_files(const fs::path& from, const FolderFiles& wanted, const fs::path& to, CopyTally& tally) {
   std::error_code ec;

@@ -2,13 +2,12 @@
 #pragma once
 
 #include <cstdint>
+#include <ctime>
 #include <filesystem>
 #include <map>
 #include <string>
 #include <string_view>
 #include <vector>
-
-#include <ctime>
 
 #include "base/progress.h"
 #include "base/result.h"
@@ -65,8 +64,8 @@ class FileCopier {
   std::string other_ = std::string(kPart, '\0');
 };
 
-/// Makes the folder `to` hold the files of `from` that are `wanted`, on the disk, and no others. What is there
-/// with the size and time of its original is left as it is. Counts each byte twice.
+/// Makes the folder `to` hold the files of `from` that are `wanted`, on the disk, and no others. What is
+/// there with the size and time of its original is left as it is. Counts each byte twice.
 Status copy_files(const std::filesystem::path& from, const FolderFiles& wanted,
                   const std::filesystem::path& to, CopyTally& tally);
 

@@ -34,12 +34,13 @@ void tell_join_line(std::string_view name, std::string_view words) {
   std::printf("%s\n", fmt::format("{:<16} {}", name, words).c_str());
 }
 
-/// "its clock was 5000.000000 s ahead of the session's (to within 0.200 ms) and drifted by +36.000 ms (+30.00 ppm)".
+/// "its clock was 5000.000000 s ahead of the session's (to within 0.200 ms) and drifted by +36.000 ms (+30.00
+/// ppm)".
 std::string words_of_clock(const session::ClockReadings& readings) {
   const session::ClockSummary clock = session::summary_of(readings);
-  std::string words = fmt::format("its clock was {:.6f} s {} the session's (to within {:.3f} ms)",
-                                  std::abs(clock.ahead.value()), clock.ahead.value() < 0 ? "behind" : "ahead of",
-                                  in_milliseconds(clock.sigma));
+  std::string words = fmt::format(
+      "its clock was {:.6f} s {} the session's (to within {:.3f} ms)", std::abs(clock.ahead.value()),
+      clock.ahead.value() < 0 ? "behind" : "ahead of", in_milliseconds(clock.sigma));
   if (readings.size() < 2) return words + "; read once, so how it drifted isn't known";
   return words + fmt::format(" and drifted by {:+.3f} ms ({:+.2f} ppm)", in_milliseconds(clock.drifted),
                              clock.drift.value());
@@ -62,12 +63,15 @@ void tell_joined(const session::Joined& joined) {
   tell_join_line("cameras", std::to_string(joined.manifest.cameras_size()));
   tell_join_line("frames", fmt::format("{}, {} lost", frames, lost));
   for (const v1::HostPart& host : joined.hosts) {
-    tell_join_line(host.host(), fmt::format("{}: {}", fmt::join(host.camera_ids(), ", "), words_of_clock(host.clock())));
+    tell_join_line(host.host(),
+                   fmt::format("{}: {}", fmt::join(host.camera_ids(), ", "), words_of_clock(host.clock())));
     if (host.state() == v1::HostPart::SHORT)
-      tell_join_line("", "doesn't reach to the recording's end" + (host.why().empty() ? "" : ": " + host.why()));
+      tell_join_line("",
+                     "doesn't reach to the recording's end" + (host.why().empty() ? "" : ": " + host.why()));
   }
   if (joined.events_left_out > 0)
-    tell_join_line("left out", fmt::format("{} decisions of other hosts' own alignments", joined.events_left_out));
+    tell_join_line("left out",
+                   fmt::format("{} decisions of other hosts' own alignments", joined.events_left_out));
   for (const v1::HostPart& host : joined.manifest.hosts()) tell_join_line("missing", words_of_missing(host));
 }
 
@@ -91,8 +95,7 @@ void add_sessions_join(CLI::App& sessions) {
       "join",
       "Makes one session of the parts that several hosts recorded of it. The parts stay; the session appears "
       "when it is whole, on the disk and read back.");
-  verb->add_option("PART", a->parts,
-                   "The folders of the parts, the leading host's among them; in any order")
+  verb->add_option("PART", a->parts, "The folders of the parts, the leading host's among them; in any order")
       ->required();
   verb->add_option("--out", a->out, "Folder to make")->required();
   verb->add_flag("--without-missing", a->without_missing,

@@ -33,11 +33,11 @@ struct Joined {
 /// back, or not at all. The leader's cameras come first, then the others' in the order of its `hosts`; files
 /// of cameras are copied as they are, with the stamps of their hosts' clocks, and the manifest tells each
 /// camera's clock, by which SessionReader shows them on the session's. No part can be recorded or changed by
-/// another process meanwhile. Errors: bad_input (a folder that is no session, or given twice; parts of several
-/// sessions or purposes; not exactly one that leads; one that wasn't recorded for another host, or that the
-/// leader doesn't name; other cameras than it names, or one twice; no or a wild reading of a host's clock; a
-/// missing part; times.json in some parts alone; the target is in the way), refused (a part isn't finished, or
-/// another process writes it; cancelled by the observer), io.
+/// another process meanwhile. Errors: bad_input (a folder that is no session, or given twice; parts of
+/// several sessions or purposes; not exactly one that leads; one that wasn't recorded for another host, or
+/// that the leader doesn't name; other cameras than it names, or one twice; no or a wild reading of a host's
+/// clock; a missing part; times.json in some parts alone; the target is in the way), refused (a part isn't
+/// finished, or another process writes it; cancelled by the observer), io.
 Result<Joined> join_sessions(const std::vector<std::filesystem::path>& parts,
                              const std::filesystem::path& out, Missing missing,
                              const Observer& observer = {});

@@ -31,9 +31,8 @@ const v1::DecisionEvent* same_lock(const v1::DecisionEvent& lock, const PartEven
 void tell_worst_pair(v1::DecisionEvent& lock) {
   lock.clear_worst_pair_s();
   const auto& cameras = lock.cameras();
-  if (cameras.empty() || std::any_of(cameras.begin(), cameras.end(), [](const auto& camera) {
-        return !camera.has_error_s();
-      }))
+  if (cameras.empty() ||
+      std::any_of(cameras.begin(), cameras.end(), [](const auto& camera) { return !camera.has_error_s(); }))
     return;
   const auto [least, most] = std::minmax_element(
       cameras.begin(), cameras.end(), [](const auto& a, const auto& b) { return a.error_s() < b.error_s(); });

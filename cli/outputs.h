@@ -9,7 +9,8 @@
 namespace emberlock::cli {
 
 // The verbs that write output folders, besides `reconstruct` (recon/pipeline/reconstruct.h) and `sessions
-// export` (session/export.h). New sessions (import, align --record) need a new folder: check_new_folder().
+// export` (session/export.h). New sessions (import, align --record, `sessions join`) need a new
+// folder: check_new_folder().
 
 inline constexpr OutputVerb kPlan{"reconstruct --plan"};
 inline constexpr OutputVerb kSequence{"reconstruct --frames"};

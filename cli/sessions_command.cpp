@@ -15,6 +15,7 @@
 #include "cli/interrupt.h"
 #include "cli/sessions_backup.h"
 #include "cli/sessions_daemon.h"
+#include "cli/sessions_join.h"
 #include "session/certificate.h"
 #include "session/export.h"
 #include "session/job_json.h"
@@ -236,9 +237,9 @@ CLI::App* add_verb(CLI::App& sessions, const char* name, const char* words,
 
 void add_sessions(CLI::App& app) {
   auto a = std::make_shared<SessionsArguments>();
-  CLI::App* sessions = app.add_subcommand(
-      "sessions",
-      "Lists, verifies, repairs, exports and backs up recordings: the daemon's by name, others by path.");
+  CLI::App* sessions = app.add_subcommand("sessions",
+                                          "Lists, verifies, repairs, exports, backs up and joins recordings: "
+                                          "the daemon's by name, others by path.");
   sessions->require_subcommand(1);
   CLI::App* all = sessions->add_subcommand("list", "Lists the sessions in a folder, the newest first.");
   all->add_option("FOLDER", a->folder, "Folder of sessions [the daemon's]");
@@ -273,6 +274,7 @@ void add_sessions(CLI::App& app) {
       ->check(CLI::IsMember({"png", "video"}))
       ->capture_default_str();
   add_sessions_backup(*sessions);
+  add_sessions_join(*sessions);
 }
 
 }  // namespace emberlock::cli

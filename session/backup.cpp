@@ -2,13 +2,8 @@
 #include "session/backup.h"
 
 #include <algorithm>
-#include <cerrno>
-#include <chrono>
-#include <cstddef>
 #include <cstdio>
-#include <cstdlib>
 #include <iterator>
-#include <map>
 #include <string>
 #include <string_view>
 #include <system_error>
@@ -24,6 +19,7 @@
 #include "base/output_folder.h"
 #include "base/unique_fd.h"
 #include "session/events.h"
+#include "session/file_copies.h"
 #include "session/files.h"
 #include "session/verify.h"
 
@@ -35,167 +31,10 @@ constexpr const char* kPartialSuffix = ".partial";
 constexpr const char* kReplacedSuffix = ".replaced";
 constexpr std::string_view kRemovedPrefix = ".removed-";
 
-struct FileFacts {
-  std::uint64_t bytes = 0;
-  timespec modified{};
-};
-
-/// All files of a session or of its copy, by their path within it.
-struct Files {
-  std::map<std::string, FileFacts> files;
-  std::vector<fs::path> folders;  ///< below the outermost one, parents first
-  [[nodiscard]] std::uint64_t bytes() const {
-    std::uint64_t sum = 0;
-    for (const auto& [path, facts] : files) sum += facts.bytes;
-    return sum;
-  }
-};
-
-Result<Files> files_in(const fs::path& folder) {
-  Files found;
-  std::error_code ec;
-  for (fs::recursive_directory_iterator at(folder, ec), end; !ec && at != end; at.increment(ec)) {
-    struct stat info {};
-    if (::lstat(at->path().c_str(), &info) != 0) return errno_error(at->path(), "cannot be looked at");
-    const fs::path within = at->path().lexically_relative(folder);
-    if (S_ISDIR(info.st_mode)) {
-      found.folders.push_back(within);
-    } else if (S_ISREG(info.st_mode)) {
-      found.files[within.string()] = {static_cast<std::uint64_t>(info.st_size), info.st_mtim};
-    } else {
-      return Error{ErrorKind::bad_input, "is neither a file nor a folder, and a session holds only those",
-                   at->path().string(), "Move it away; of a link, put in its place what it leads to"};
-    }
-  }
-  if (ec) return Error{ErrorKind::io, "cannot be listed: " + ec.message(), folder.string()};
-  return found;
-}
-
-std::int64_t nanoseconds(const timespec& time) {
-  return std::int64_t{time.tv_sec} * 1'000'000'000 + time.tv_nsec;
-}
-
-/// By how much the file system of a copy may have rounded its time: whole steps of 2 s (FAT), 10 ms (exFAT),
-/// 100 ns (NTFS).
-std::int64_t rounding_of(std::int64_t copied) {
-  if (copied % 1'000'000'000 == 0) return 2'000'000'000;
-  return copied % 10'000'000 == 0 ? 10'000'000 : 100;
-}
-
-bool times_agree(const FileFacts& file, const FileFacts& copy) {
-  const std::int64_t copied = nanoseconds(copy.modified);
-  return file.bytes == copy.bytes && std::abs(nanoseconds(file.modified) - copied) < rounding_of(copied);
-}
-
-Result<UniqueFd> open_to_read(const fs::path& path) {
-  UniqueFd fd(::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NOFOLLOW));
-  if (!fd) return errno_error(path, "cannot open");
-  return fd;
-}
-
-/// Reads until `buffer` is full or the file ends.
-Result<std::string_view> read_next(const UniqueFd& fd, std::string& buffer, const fs::path& path) {
-  std::size_t filled = 0;
-  while (filled < buffer.size()) {
-    const ssize_t n = ::read(fd.get(), buffer.data() + filled, buffer.size() - filled);
-    if (n < 0 && errno == EINTR) continue;
-    if (n < 0) return errno_error(path, "cannot read");
-    if (n == 0) break;
-    filled += static_cast<std::size_t>(n);
-  }
-  return std::string_view(buffer).substr(0, filled);
-}
-
-/// Bytes that have been handled, of those that have to be.
-class Tally {
- public:
-  Tally(std::uint64_t all, const Observer& observer)
-      : all_(std::max<std::uint64_t>(all, 1)), observer_(observer) {}
-  Status add(std::uint64_t bytes, std::string_view what) {
-    done_ += bytes;
-    return observe(observer_, std::min(kNearlyDone, static_cast<double>(done_) / static_cast<double>(all_)),
-                   what);
-  }
-
- private:
-  std::uint64_t all_;
-  std::uint64_t done_ = 0;
-  const Observer& observer_;
-};
-
-/// Copies and compares files through two buffers of its own.
-class FileCopier {
- public:
-  Status copy(const fs::path& from, const fs::path& to, const FileFacts& facts, Tally& tally) {
-    EMBERLOCK_ASSIGN_OR_RETURN(const UniqueFd in, open_to_read(from));
-    const UniqueFd out(::open(to.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC | O_NOFOLLOW, 0644));
-    if (!out) return errno_error(to, "cannot open for writing");
-    for (;;) {
-      EMBERLOCK_ASSIGN_OR_RETURN(const std::string_view part, read_next(in, one_, from));
-      if (part.empty()) break;
-      EMBERLOCK_RETURN_IF_ERROR(write_fully(out.get(), part, to));
-      EMBERLOCK_RETURN_IF_ERROR(tally.add(part.size(), from.filename().string()));
-    }
-    if (::fsync(out.get()) != 0) return errno_error(to, "cannot be written to the disk");
-    // So that it is the disk that is read back.
-    (void)::posix_fadvise(out.get(), 0, 0, POSIX_FADV_DONTNEED);
-    EMBERLOCK_RETURN_IF_ERROR(compare(from, to, tally));
-    // Its time says that it is whole: last.
-    const timespec times[2] = {facts.modified, facts.modified};
-    if (::futimens(out.get(), times) != 0) return errno_error(to, "cannot be given its time");
-    return {};
-  }
-
-  Status compare(const fs::path& from, const fs::path& to, Tally& tally) {
-    EMBERLOCK_ASSIGN_OR_RETURN(const UniqueFd a, open_to_read(from));
-    EMBERLOCK_ASSIGN_OR_RETURN(const UniqueFd b, open_to_read(to));
-    for (std::uint64_t at = 0;;) {
-      EMBERLOCK_ASSIGN_OR_RETURN(const std::string_view left, read_next(a, one_, from));
-      EMBERLOCK_ASSIGN_OR_RETURN(const std::string_view right, read_next(b, other_, to));
-      if (left != right) {
-        const auto same = static_cast<std::uint64_t>(
-            std::mismatch(left.begin(), left.end(), right.begin(), right.end()).first - left.begin());
-        return Error{ErrorKind::bad_input,
-                     fmt::format("differs from {} at byte {}", from.string(), at + same), to.string()};
-      }
-      if (left.empty()) return {};
-      at += left.size();
-      EMBERLOCK_RETURN_IF_ERROR(tally.add(left.size(), from.filename().string()));
-    }
-  }
-
- private:
-  static constexpr std::size_t kPart = std::size_t{1} << 20;
-  std::string one_ = std::string(kPart, '\0');
-  std::string other_ = std::string(kPart, '\0');
-};
-
 /// "NAME" of "sessions/NAME" and of "sessions/NAME/".
 fs::path named(const fs::path& folder) {
   const fs::path whole = fs::absolute(folder).lexically_normal();
   return whole.has_filename() ? whole : whole.parent_path();
-}
-
-Status copy_missing(const fs::path& from, const Files& wanted, const fs::path& to, Tally& tally) {
-  std::error_code ec;
-  for (const fs::path& folder : wanted.folders) {
-    fs::create_directory(to / folder, ec);
-    if (ec) return Error{ErrorKind::io, "cannot be created: " + ec.message(), (to / folder).string()};
-  }
-  EMBERLOCK_ASSIGN_OR_RETURN(const Files there, files_in(to));
-  for (const auto& [path, facts] : there.files)
-    if (!wanted.files.contains(path)) fs::remove(to / path, ec);
-  FileCopier copier;
-  for (const auto& [path, facts] : wanted.files) {
-    const auto earlier = there.files.find(path);
-    if (earlier != there.files.end() && times_agree(facts, earlier->second)) {
-      EMBERLOCK_RETURN_IF_ERROR(tally.add(2 * facts.bytes, path));
-      continue;
-    }
-    EMBERLOCK_RETURN_IF_ERROR(copier.copy(from / path, to / path, facts, tally));
-  }
-  for (const fs::path& folder : wanted.folders) EMBERLOCK_RETURN_IF_ERROR(sync_folder(to / folder));
-  return sync_folder(to);
 }
 
 /// A copy that a power cut kept from being replaced has its name again.
@@ -232,10 +71,10 @@ bool is_read_back(const std::string& path) {
 }
 
 /// Of two files of one time one must be damaged, and nobody knows which.
-Status expect_none_rotted(const fs::path& from, const Files& wanted, const fs::path& copy) {
-  EMBERLOCK_ASSIGN_OR_RETURN(const Files there, files_in(copy));
+Status expect_none_rotted(const fs::path& from, const FolderFiles& wanted, const fs::path& copy) {
+  EMBERLOCK_ASSIGN_OR_RETURN(const FolderFiles there, files_in(copy));
   const Observer none;
-  Tally tally(1, none);
+  CopyTally tally(1, none);
   FileCopier files;
   for (const auto& [path, facts] : wanted.files) {
     const auto found = there.files.find(path);
@@ -251,7 +90,7 @@ Status expect_none_rotted(const fs::path& from, const Files& wanted, const fs::p
 }
 
 /// A copy that differs from the session stays where it may be the better one, or another session's.
-Status expect_may_replace(const fs::path& from, const Files& wanted, const fs::path& copy,
+Status expect_may_replace(const fs::path& from, const FolderFiles& wanted, const fs::path& copy,
                           const Error& difference, const Observer& observer) {
   EMBERLOCK_ASSIGN_OR_RETURN(const v1::Manifest manifest, read_manifest(from));
   if (const auto other = read_manifest(copy)) {
@@ -276,7 +115,7 @@ Status expect_may_replace(const fs::path& from, const Files& wanted, const fs::p
 
 /// All of it is on the disk, whoever copied it there.
 Status sync_files(const fs::path& folder) {
-  EMBERLOCK_ASSIGN_OR_RETURN(const Files files, files_in(folder));
+  EMBERLOCK_ASSIGN_OR_RETURN(const FolderFiles files, files_in(folder));
   for (const auto& [path, facts] : files.files) {
     EMBERLOCK_ASSIGN_OR_RETURN(const UniqueFd fd, open_to_read(folder / path));
     if (::fsync(fd.get()) != 0) return errno_error(folder / path, "cannot be written to the disk");
@@ -289,8 +128,8 @@ Status sync_files(const fs::path& folder) {
 }  // namespace
 
 Status compare_copy(const fs::path& folder, const fs::path& copy, Compare compare, const Observer& observer) {
-  EMBERLOCK_ASSIGN_OR_RETURN(const Files wanted, files_in(folder));
-  EMBERLOCK_ASSIGN_OR_RETURN(const Files there, files_in(copy));
+  EMBERLOCK_ASSIGN_OR_RETURN(const FolderFiles wanted, files_in(folder));
+  EMBERLOCK_ASSIGN_OR_RETURN(const FolderFiles there, files_in(copy));
   for (const auto& [path, facts] : there.files)
     if (!wanted.files.contains(path))
       return Error{ErrorKind::bad_input, "isn't in " + folder.string(), (copy / path).string()};
@@ -309,7 +148,7 @@ Status compare_copy(const fs::path& folder, const fs::path& copy, Compare compar
           (copy / path).string()};
   }
   if (compare == Compare::times) return {};
-  Tally tally(wanted.bytes(), observer);
+  CopyTally tally(wanted.bytes(), observer);
   FileCopier files;
   for (const auto& [path, facts] : wanted.files)
     EMBERLOCK_RETURN_IF_ERROR(files.compare(folder / path, copy / path, tally));
@@ -320,7 +159,7 @@ Result<Backup> back_up_session(const fs::path& folder, const fs::path& backups, 
                                const Observer& observer) {
   const fs::path from = named(folder);
   EMBERLOCK_ASSIGN_OR_RETURN(const UniqueFd held, hold_finished(from, Alone::no));
-  EMBERLOCK_ASSIGN_OR_RETURN(const Files wanted, files_in(from));
+  EMBERLOCK_ASSIGN_OR_RETURN(const FolderFiles wanted, files_in(from));
   const fs::path copy = named(backups) / from.filename();
   EMBERLOCK_RETURN_IF_ERROR(check_apart(copy, {from}));
   const fs::path partial = named(backups) / ("." + from.filename().string() + kPartialSuffix);
@@ -346,8 +185,8 @@ Result<Backup> back_up_session(const fs::path& folder, const fs::path& backups, 
     return Error{ErrorKind::refused, "another process makes this copy", partial.string(),
                  "Wait until that has ended"};
   const Observer rest = part_of(observer, backup.outcome == Backup::Outcome::renewed ? 0.6 : 0, 1);
-  Tally tally(2 * backup.bytes, rest);
-  EMBERLOCK_RETURN_IF_ERROR(copy_missing(from, wanted, partial, tally));
+  CopyTally tally(2 * backup.bytes, rest);
+  EMBERLOCK_RETURN_IF_ERROR(copy_files(from, wanted, partial, tally));
   EMBERLOCK_RETURN_IF_ERROR(put_in_place(partial, copy, replaced));
   return backup;
 }

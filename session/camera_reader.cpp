@@ -67,14 +67,20 @@ Result<std::string> read_part(const fs::path& path, std::uint64_t first, std::ui
 }  // namespace
 
 CameraReader::CameraReader(fs::path folder, std::string camera_id, ImageLayout layout,
-                           std::vector<IndexRecord> records)
+                           std::vector<IndexRecord> records, HostClock clock)
     : folder_(std::move(folder)),
       camera_id_(std::move(camera_id)),
       layout_(layout),
+      clock_(std::move(clock)),
       records_(std::move(records)) {
   stamps_.reserve(records_.size());
   std::transform(records_.begin(), records_.end(), std::back_inserter(stamps_),
-                 [](const IndexRecord& r) { return r.stamp; });
+                 [this](const IndexRecord& r) { return on_session(r.stamp); });
+}
+
+FrameStamp CameraReader::on_session(FrameStamp stamp) const {
+  stamp.monotonic_time = clock_.on_session(stamp.monotonic_time);
+  return stamp;
 }
 
 Status CameraReader::open_segment(std::uint32_t number) {
@@ -105,7 +111,7 @@ Status CameraReader::grow_to(std::uint64_t frames) {
                  path.string(), "Wait until the recording has ended; then verify it"};
   for (const IndexRecord& record : index.records) {
     records_.push_back(record);
-    stamps_.push_back(record.stamp);
+    stamps_.push_back(on_session(record.stamp));
   }
   return {};
 }
@@ -133,7 +139,7 @@ Result<Frame> CameraReader::read(std::size_t i) {
                    find_segment(folder_, camera_id_, record.segment).string(),
                    "Leave this frame out, or restore the file"});
   }
-  return Frame{record.stamp, std::make_shared<const Image>(std::move(image).value())};
+  return Frame{stamps_[i], std::make_shared<const Image>(std::move(image).value())};
 }
 
 }  // namespace emberlock::session

@@ -10,6 +10,7 @@
 #include "base/frame.h"
 #include "base/result.h"
 #include "emberlock/v1/session.pb.h"
+#include "session/host_clock.h"
 #include "session/index.h"
 #include "session/segment.h"
 
@@ -18,11 +19,14 @@ namespace emberlock::session {
 /// One camera's part of a SessionReader: its index, and the segment that was read last. One thread at a time.
 class CameraReader {
  public:
+  /// `clock`: of the stamps in the records.
   CameraReader(std::filesystem::path folder, std::string camera_id, ImageLayout layout,
-               std::vector<IndexRecord> records);
+               std::vector<IndexRecord> records, HostClock clock = {});
 
   [[nodiscard]] const ImageLayout& layout() const { return layout_; }
+  /// On the session's clock, like those of the frames that read() returns.
   [[nodiscard]] const std::vector<FrameStamp>& stamps() const { return stamps_; }
+  /// As the index has them: on the clock of the host that recorded them.
   [[nodiscard]] const std::vector<IndexRecord>& records() const { return records_; }
   Result<Frame> read(std::size_t i);
   /// Takes the frames of a recording that goes on up to the first `frames`, which are on the disk. Errors:
@@ -35,10 +39,12 @@ class CameraReader {
 
  private:
   Status open_segment(std::uint32_t number);
+  [[nodiscard]] FrameStamp on_session(FrameStamp stamp) const;
 
   std::filesystem::path folder_;
   std::string camera_id_;
   ImageLayout layout_;
+  HostClock clock_;
   std::vector<IndexRecord> records_;
   std::vector<FrameStamp> stamps_;
   std::optional<SegmentReader> segment_;

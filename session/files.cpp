@@ -15,6 +15,7 @@
 
 #include "base/file.h"
 #include "base/unique_fd.h"
+#include "session/host_clock.h"
 #include "session/json_message.h"
 #include "session/layout.h"
 #include "session/name.h"
@@ -142,6 +143,7 @@ Status check_manifest(const v1::Manifest& manifest, const std::string& where) {
       return Error{ErrorKind::bad_input, "must be finite and not negative", field + ", field late_sigma_s",
                    "Mend the time"};
     }
+    EMBERLOCK_RETURN_IF_ERROR(HostClock::of(camera.clock(), field));
     if (camera.has_calibration()) EMBERLOCK_RETURN_IF_ERROR(check_calibration(camera.calibration(), field));
   }
   if (manifest.has_box()) EMBERLOCK_RETURN_IF_ERROR(check_box(manifest.box(), where));

@@ -29,7 +29,7 @@ std::filesystem::path find_segment(const std::filesystem::path& folder, const st
 Result<v1::Manifest> parse_manifest(std::string_view json, const std::string& where);
 Result<v1::Manifest> read_manifest(const std::filesystem::path& folder);
 /// Checks what readers and writers rely on: version, camera ids that are unique and valid folder names,
-/// layouts, finite numbers.
+/// layouts, finite numbers, clocks.
 Status check_manifest(const v1::Manifest& manifest, const std::string& where);
 /// Checks texts before they are written: length, no control characters. Reading accepts any text.
 Status check_texts(const v1::Manifest& manifest, const std::string& where);

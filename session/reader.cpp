@@ -8,6 +8,7 @@
 #include "session/camera_reader.h"
 #include "session/events.h"
 #include "session/files.h"
+#include "session/host_clock.h"
 #include "session/layout.h"
 
 namespace emberlock::session {
@@ -33,6 +34,7 @@ Result<SessionReader> SessionReader::open(const fs::path& folder) {
   SessionReader reader(folder, std::move(manifest));
   for (const v1::CameraStream& camera : reader.manifest_.cameras()) {
     EMBERLOCK_ASSIGN_OR_RETURN(const ImageLayout layout, layout_of(camera));
+    EMBERLOCK_ASSIGN_OR_RETURN(const HostClock clock, clock_of(camera, manifest_path(folder).string()));
     EMBERLOCK_ASSIGN_OR_RETURN(ParsedIndex index, read_index(folder, camera.camera_id()));
     if (!index.whole() || index.records.size() != camera.counts().recorded()) {
       return Error{ErrorKind::bad_input,
@@ -42,7 +44,7 @@ Result<SessionReader> SessionReader::open(const fs::path& folder) {
                    "Salvage the session, or restore the file"};
     }
     reader.cameras_.push_back(
-        std::make_unique<CameraReader>(folder, camera.camera_id(), layout, std::move(index.records)));
+        std::make_unique<CameraReader>(folder, camera.camera_id(), layout, std::move(index.records), clock));
   }
   const fs::path path = events_path(folder);
   EMBERLOCK_ASSIGN_OR_RETURN(const std::string bytes, read_file(path));
@@ -62,8 +64,9 @@ Result<SessionReader> SessionReader::follow(const fs::path& folder) {
   reader.grows_ = true;
   for (const v1::CameraStream& camera : reader.manifest_.cameras()) {
     EMBERLOCK_ASSIGN_OR_RETURN(const ImageLayout layout, layout_of(camera));
-    reader.cameras_.push_back(
-        std::make_unique<CameraReader>(folder, camera.camera_id(), layout, std::vector<IndexRecord>()));
+    EMBERLOCK_ASSIGN_OR_RETURN(const HostClock clock, clock_of(camera, manifest_path(folder).string()));
+    reader.cameras_.push_back(std::make_unique<CameraReader>(folder, camera.camera_id(), layout,
+                                                             std::vector<IndexRecord>(), clock));
   }
   return reader;
 }

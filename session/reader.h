@@ -41,7 +41,9 @@ class SessionReader {
   [[nodiscard]] const v1::Manifest& manifest() const { return manifest_; }
   [[nodiscard]] std::size_t camera_count() const { return cameras_.size(); }
   [[nodiscard]] const ImageLayout& layout(std::size_t camera) const;
-  /// One stamp per recorded frame, in the order of recording.
+  /// One stamp per recorded frame, in the order of recording. Their monotonic_time, like that of the frames
+  /// that read() returns, is on the session's clock: of a session that was joined from several hosts' parts
+  /// the files have it on the clock of the host that recorded them.
   [[nodiscard]] const std::vector<FrameStamp>& stamps(std::size_t camera) const;
   /// In the order of recording.
   [[nodiscard]] const std::vector<v1::Event>& events() const { return events_; }

@@ -101,6 +101,7 @@ Result<SessionWriter> SessionWriter::create(const fs::path& where, v1::Manifest 
   for (v1::CameraStream& camera : *manifest.mutable_cameras()) {
     camera.clear_segments();
     camera.clear_counts();
+    camera.clear_clock();  // frames that are written bear the session's
     camera.set_model(in_one_line(camera.model()));
   }
   EMBERLOCK_RETURN_IF_ERROR(check_texts(manifest, manifest_path(folder).string()));

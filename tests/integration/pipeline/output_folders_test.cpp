@@ -28,6 +28,7 @@
 #include "tests/support/marker_film.h"
 #include "tests/support/recording.h"
 #include "tests/support/scene_files.h"
+#include "tests/support/session_parts.h"
 #include "tests/support/strobe_clips.h"
 #include "tests/support/verb.h"
 
@@ -282,6 +283,7 @@ class OutputFolders : public testing::Test {
   /// Verbs that make a new session, and never replace one.
   std::vector<Writer> founding() {
     make_transforms(temp_ / "project");
+    const std::vector<fs::path> parts = record_parts_once();
     return {
         {"import",
          "--out",
@@ -295,7 +297,18 @@ class OutputFolders : public testing::Test {
          {"align", "--rig", "virtual:3", "--tolerance", "100rows", "--shortest-take", "0"},
          {},
          {"manifest.json", "events.binpb"}},
+        {"sessions join",
+         "--out",
+         add_sessions,
+         {"sessions", "join", parts[0].string(), parts[1].string(), parts[2].string()},
+         parts[1] / "manifest.json",
+         {"manifest.json", "events.binpb", "above/index.bin"}},
     };
+  }
+  /// founding() is asked for more than once in a test.
+  std::vector<fs::path> record_parts_once() {
+    if (parts_.empty()) parts_ = test::record_parts(temp_ / "parts", test::three_hosts(), {.frames = 2});
+    return parts_;
   }
   static test::VerbRun run(const Writer& writer, const fs::path& out) {
     Words words = writer.words;
@@ -316,6 +329,7 @@ class OutputFolders : public testing::Test {
     EXPECT_EQ(files_below(temp_.path()), before) << writer.verb;
   }
   test::TempFolder temp_;
+  std::vector<fs::path> parts_;
 };
 
 /// Every option of every verb that names a folder to write to, as the tables above have it.

@@ -1,4 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <string>
+#include <vector>
+
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
@@ -6,6 +9,7 @@
 #include "cli/commands.h"
 #include "session/files.h"
 #include "tests/support/recording.h"
+#include "tests/support/session_parts.h"
 #include "tests/support/verb.h"
 
 namespace emberlock::cli {
@@ -89,6 +93,48 @@ TEST(SessionsVerb, ExportsImagesAndVideos) {
   EXPECT_EQ(nlohmann::json::parse(video.out)["cameras"][0]["frames"], 3);
   EXPECT_TRUE(std::filesystem::exists(temp / "mp4/cam0.mp4"));
   EXPECT_EQ(run_verb(add_sessions, {"sessions", "export", session, "--out", session}).exit_code, 2);
+}
+
+TEST(SessionsVerb, JoinsThePartsOfSeveralHosts) {
+  const TempFolder temp;
+  const auto parts = test::record_parts(temp / "parts", test::three_hosts());
+  const std::string out = (temp / "joined").string();
+  const auto joined = run_verb(add_sessions, {"sessions", "join", parts[2].string(), parts[0].string(),
+                                              parts[1].string(), "--out", out});
+  EXPECT_EQ(joined.exit_code, 0) << joined.err;
+  EXPECT_THAT(joined.out, testing::ContainsRegex("cameras +5\n"));
+  EXPECT_THAT(joined.out, testing::ContainsRegex("frames +105, 0 lost\n"));
+  EXPECT_THAT(joined.out, HasSubstr("lab-2:50051      back, above: its clock was 5000.000030 s ahead of the "
+                                    "session's (to within 0.200 ms) and drifted by +35.940 ms (+30.00 ppm)"));
+  EXPECT_THAT(joined.out, HasSubstr("front: its clock was 70.000012 s behind the session's"));
+  EXPECT_THAT(joined.out, HasSubstr("(-12.00 ppm)"));
+  EXPECT_THAT(joined.out, HasSubstr("joined"));
+  EXPECT_THAT(joined.out, testing::Not(HasSubstr("missing")));
+  EXPECT_EQ(run_verb(add_sessions, {"sessions", "verify", out}).exit_code, 0);
+}
+
+TEST(SessionsVerb, JoinsWithoutAMissingPartWhereItIsTold) {
+  const TempFolder temp;
+  const auto parts = test::record_parts(temp / "parts", test::three_hosts(), {.frames = 2});
+  test::change_manifest(parts[0], [](v1::Manifest& manifest) {
+    manifest.mutable_hosts(0)->set_state(v1::HostPart::SHORT);
+    manifest.mutable_hosts(0)->set_why("its disk was full");
+    manifest.mutable_hosts(1)->set_state(v1::HostPart::MISSING);
+    manifest.mutable_hosts(1)->set_why("it doesn't answer");
+  });
+  const std::string out = (temp / "joined").string();
+  std::vector<std::string> words{"sessions", "join", parts[0].string(), parts[1].string(), "--out", out};
+  const auto refused = run_verb(add_sessions, words);
+  EXPECT_EQ(refused.exit_code, 2);
+  EXPECT_THAT(refused.err, HasSubstr("\"take 1\" of lab-3:50051"));
+  EXPECT_THAT(refused.err, HasSubstr("--without-missing"));
+  EXPECT_FALSE(std::filesystem::exists(out));
+  words.emplace_back("--without-missing");
+  const auto joined = run_verb(add_sessions, words);
+  EXPECT_EQ(joined.exit_code, 0) << joined.err;
+  EXPECT_THAT(joined.out, HasSubstr("doesn't reach to the recording's end: its disk was full"));
+  EXPECT_THAT(joined.out,
+              testing::ContainsRegex("missing +\"take 1\" of lab-3:50051, with front: it doesn't"));
 }
 
 }  // namespace

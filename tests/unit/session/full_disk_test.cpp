@@ -17,8 +17,10 @@
 
 #include "session/async_writer.h"
 #include "session/files.h"
+#include "session/join.h"
 #include "session/verify.h"
 #include "tests/support/recording.h"
+#include "tests/support/session_parts.h"
 
 // A disk that is full, in earnest: a process of its own records to a small file system in memory (in a mount
 // namespace), or may not let a file grow.
@@ -142,6 +144,21 @@ TEST_P(FullDisk, FilesThatMayNotGrowAreAsAFullDisk) {
     std::uint64_t lost = 0;
     return record_all(temp / "s", GetParam(), lost);
   });
+  EXPECT_EQ(code, 0);
+}
+
+TEST(JoinOnAFullDisk, LeavesNothing) {
+  const TempFolder temp;
+  const auto parts = test::record_parts(temp / "parts", test::three_hosts(), {.frames = 200});  // 3 MB
+  std::filesystem::create_directory(temp / "disk");
+  const int code = in_a_process([&]() -> std::string {
+    if (std::string wrong = mount_small_disk(temp / "disk", 2); !wrong.empty()) return wrong;
+    const auto joined = join_sessions(parts, temp / "disk/joined", Missing::is_an_error);
+    if (joined) return "the disk held more than it can";
+    if (joined.error().kind != ErrorKind::io) return joined.error().message();
+    return std::filesystem::is_empty(temp / "disk") ? "" : "something is left";
+  });
+  ASSERT_NE(code, kNoNamespace) << "nobody may mount here: run as root, or allow user namespaces";
   EXPECT_EQ(code, 0);
 }
 

@@ -52,6 +52,7 @@ TEST(Manifest, AnErrorNamesFileAndField) {
       {manifest_with(R"(, "late_s": -0.001)"), "late_s"},
       {manifest_with(R"(, "frame_rate_hz": 24, "late_s": 0.05)"), "late_s"},
       {manifest_with(R"(, "late_sigma_s": "Infinity")"), "late_sigma_s"},
+      {manifest_with(R"(, "clock": [{"at_ns": 1}, {"at_ns": 1}])"), "clock"},
       {manifest_with(R"(, "calibration": {"camera_from_world": [1, 2, 3]})"), "calibration"},
       {manifest_with(R"(, "calibration": {"fx": "Infinity"})"), "calibration"},
       {manifest_with("", R"(, "box": {"center": [0, 0, 0], "size": [1, 0, 1]})"), "box"},

@@ -43,7 +43,7 @@ std::string host_line(const v1::HostStatus& host) {
     parts.push_back("round trip " + short_time(host.round_trip_s()));
   if (host.parts_wanting() > 0) parts.push_back(counted(host.parts_wanting(), "part") + " wanting");
   const std::string line = fmt::format("{}: {}", host.host(), fmt::join(parts, ", "));
-  return host.reason().empty() ? line : line + ". " + host.reason();
+  return host.light() == v1::GREEN || host.reason().empty() ? line : line + ": " + host.reason();
 }
 
 std::string part_line(const v1::HostPart& part) {
@@ -56,7 +56,7 @@ std::string part_line(const v1::HostPart& part) {
     words.push_back(part.lost() == 0 ? "none lost" : fmt::format("{} lost", part.lost()));
   }
   const std::string line = fmt::format("{}: {}", part.host(), fmt::join(words, ", "));
-  return part.why().empty() ? line : line + ". " + part.why();
+  return part.why().empty() ? line : line + ": " + part.why();
 }
 
 std::string parts_in_words(const v1::RecordingStatus& recording) {

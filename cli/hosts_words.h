@@ -12,7 +12,7 @@ namespace emberlock::cli {
 /// Another clock: "5.000 s ahead ± 80 us", "120 us behind ± 90 us".
 std::string clock_in_words(double ahead_s, double sigma_s);
 /// "lab-2:7143: green, connected, 3 cameras, clock 5.000 s ahead ± 80 us, round trip 0.2 ms, 1 part wanting";
-/// why it is so behind it.
+/// of one that isn't green also why.
 std::string host_line(const v1::HostStatus& host);
 /// Another host's part of a recording: "lab-2:7143: whole, 3 cameras, 720 frames, 2 lost". Of one that is
 /// missing or short, why.

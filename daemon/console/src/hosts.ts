@@ -2,7 +2,7 @@
 // Cameras of several hosts as one rig: each other host that this one leads, or who leads this one's cameras; and what each keeps of a recording.
 import type {DaemonStatus, HostPart, HostPart_State, HostStatus, Light, RecordingStatus} from './api.gen';
 import {el, Keyed, set, setText, show} from './dom';
-import {count, fixed, known, plural, short} from './format';
+import {count, fixed, known, plural, sentence, short} from './format';
 import {lightWords, showSign, Sign} from './light';
 
 /** Its clock against this one's: "5.000 s ahead ± 80 µs". */
@@ -57,7 +57,7 @@ class Line {
     show(this.wanting, wanting > 0);
     setText(this.wanting, `${plural(wanting, 'part')} of recordings wanting`);
     show(this.reason, reason !== '');
-    setText(this.reason, reason);
+    setText(this.reason, reason && sentence(reason));
   }
 }
 
@@ -81,7 +81,7 @@ export class Hosts {
   private readonly list = el('ul', {class: 'host-lines'});
   private readonly lines = new Keyed<HostStatus, Line>(this.list, name => new Line(name), (line, host) =>
     line.show(host.light, !host.connected ? 'not connected' : host.light === 'GREEN' ? 'connected' : `connected, ${lightWords[host.light]}`,
-              hostWords(host), host.reason, host.parts_wanting));
+              hostWords(host), host.light === 'GREEN' ? '' : host.reason, host.parts_wanting));
   readonly root = el('section', {id: 'hosts', class: 'panel', 'aria-labelledby': 'hosts-title', hidden: true},
     el('header', {}, el('h2', {id: 'hosts-title'}, 'Hosts'), this.note), this.lent, this.list);
 

@@ -49,7 +49,7 @@ const keys = new Keys([
 document.body.append(
   header.root, bar.root,
   el('main', {},
-    el('div', {class: 'rig-view'}, cameras.root, el('aside', {}, record.root, alignment.root, hosts.root, strobe.root)),
+    el('div', {class: 'rig-view'}, cameras.root, el('aside', {}, record.root, hosts.root, alignment.root, strobe.root)),
     stylization.root, reconstruction.root, sessions.root, journal.root),
   el('footer', {}, figures, el('button', {class: 'quiet', type: 'button', onclick: () => keys.help.showModal()}, 'Keys: ?')),
   cameras.enlarged.root, keys.help, token.root, complaints);

@@ -57,18 +57,17 @@ TEST(HostsWords, AClockIsAheadOrBehindAndOnlyKnownSoWell) {
 }
 
 TEST(HostsWords, AHostSaysWhetherItAnswersAndWhyNot) {
-  v1::HostStatus there = host("lab-2:7143", true, "");
+  v1::HostStatus there = host("lab-2:7143", true, "answers");
   there.set_clock_ahead_s(5);
   there.set_clock_sigma_s(80e-6);
   there.set_round_trip_s(160e-6);
   EXPECT_EQ(host_line(there),
             "lab-2:7143: green, connected, 3 cameras, clock 5.000 s ahead ± 80 us, round trip 160 us");
-  v1::HostStatus gone = host("lab-3:7143", false, "Nobody answers at lab-3:7143.");
+  v1::HostStatus gone = host("lab-3:7143", false, "it doesn't answer");
   gone.set_cameras(1);
   gone.set_parts_wanting(2);
   gone.set_round_trip_s(160e-6);
-  EXPECT_EQ(host_line(gone),
-            "lab-3:7143: red, not connected, 1 camera, 2 parts wanting. Nobody answers at lab-3:7143.")
+  EXPECT_EQ(host_line(gone), "lab-3:7143: red, not connected, 1 camera, 2 parts wanting: it doesn't answer")
       << "its round trip was an earlier one's";
 }
 
@@ -78,10 +77,12 @@ TEST(HostsWords, APartSaysHowFarItIsOrWhyItIsNotThere) {
   whole.set_lost(2);
   EXPECT_EQ(part_line(whole), "lab-2:7143: whole, 2 cameras, 240 frames, 2 lost");
   EXPECT_EQ(part_line(part("lab-3:7143", v1::HostPart::RECORDING, 0)), "lab-3:7143: recording, 2 cameras");
-  EXPECT_EQ(part_line(part("lab-3:7143", v1::HostPart::MISSING, 0, "It doesn't answer.")),
-            "lab-3:7143: missing, 2 cameras. It doesn't answer.");
-  EXPECT_EQ(part_line(part("lab-3:7143", v1::HostPart::SHORT, 72, "It was started again after 3 s.")),
-            "lab-3:7143: short, 2 cameras, 72 frames, none lost. It was started again after 3 s.");
+  EXPECT_EQ(part_line(part("lab-3:7143", v1::HostPart::MISSING, 0, "it doesn't answer")),
+            "lab-3:7143: missing, 2 cameras: it doesn't answer");
+  EXPECT_EQ(
+      part_line(
+          part("lab-3:7143", v1::HostPart::SHORT, 72, "its frames end 3.0 s before the recording does")),
+      "lab-3:7143: short, 2 cameras, 72 frames, none lost: its frames end 3.0 s before the recording does");
 }
 
 TEST(HostsWords, PartsAreCountedByWhatIsKnownOfThem) {
@@ -126,10 +127,10 @@ class HostsVerbs : public test::GrpcServerTest {
 TEST_F(HostsVerbs, StatusHasALineForEachHostPartAndCameraElsewhere) {
   v1::DaemonStatus status;
   status.set_rig("dome");
-  v1::HostStatus& second = *status.add_hosts() = host("lab-2:7143", true, "");
+  v1::HostStatus& second = *status.add_hosts() = host("lab-2:7143", true, "answers");
   second.set_clock_ahead_s(-5);
   second.set_clock_sigma_s(80e-6);
-  *status.add_hosts() = host("lab-3:7143", false, "Nobody answers.");
+  *status.add_hosts() = host("lab-3:7143", false, "it doesn't answer");
   v1::CameraStatus& own = *status.add_cameras();
   own.set_id("near");
   v1::CameraStatus& far = *status.add_cameras();
@@ -139,17 +140,17 @@ TEST_F(HostsVerbs, StatusHasALineForEachHostPartAndCameraElsewhere) {
   v1::RecordingStatus& recording = *status.mutable_recording();
   recording.set_session("candle");
   *recording.add_hosts() = part("lab-2:7143", v1::HostPart::WHOLE, 240);
-  *recording.add_hosts() = part("lab-3:7143", v1::HostPart::MISSING, 0, "Nobody answers.");
+  *recording.add_hosts() = part("lab-3:7143", v1::HostPart::MISSING, 0, "it doesn't answer");
   api.board().show(status);
   const test::VerbRun screen = run(add_status, {"status"});
   EXPECT_EQ(screen.exit_code, 0) << screen.err;
   EXPECT_THAT(
       screen.out,
       AllOf(HasSubstr("\nhosts\n  lab-2:7143: green, connected, 3 cameras, clock 5.000 s behind ± 80 us\n"
-                      "  lab-3:7143: red, not connected, 3 cameras. Nobody answers.\ncameras\n"),
+                      "  lab-3:7143: red, not connected, 3 cameras: it doesn't answer\ncameras\n"),
             HasSubstr("  on lab-2:7143  Films.\n"),
             HasSubstr("           lab-2:7143: whole, 2 cameras, 240 frames, none lost\n"
-                      "           lab-3:7143: missing, 2 cameras. Nobody answers.\n"),
+                      "           lab-3:7143: missing, 2 cameras: it doesn't answer\n"),
             Not(HasSubstr("lent"))));
   EXPECT_EQ(json::parse(run(add_status, {"status", "--json"}).out)["recording"]["hosts"][1]["state"],
             "MISSING");
@@ -170,7 +171,7 @@ v1::DaemonStatus recorded(v1::RecordingStatus::State state, v1::HostPart::State 
   recording.set_session("candle");
   recording.set_state(state);
   recording.set_verdict("Every frame is accounted for.");
-  *recording.add_hosts() = part("lab-2:7143", second, 240, second == v1::HostPart::MISSING ? "Gone." : "");
+  *recording.add_hosts() = part("lab-2:7143", second, 240, second == v1::HostPart::MISSING ? "gone" : "");
   return status;
 }
 
@@ -178,7 +179,7 @@ TEST_F(HostsVerbs, RecordEndsWithTheOtherHostsPartsAndFailsWhereOneIsWanting) {
   for (const auto& [state, code, words] : std::vector<std::tuple<v1::HostPart::State, int, std::string>>{
            {v1::HostPart::WHOLE, 0, "lab-2:7143: whole, 2 cameras, 240 frames, none lost\n"},
            {v1::HostPart::RECORDING, 0, "lab-2:7143: recording, 2 cameras, 240 frames, none lost\n"},
-           {v1::HostPart::MISSING, 1, "lab-2:7143: missing, 2 cameras, 240 frames, none lost. Gone.\n"}}) {
+           {v1::HostPart::MISSING, 1, "lab-2:7143: missing, 2 cameras, 240 frames, none lost: gone\n"}}) {
     const v1::RecordingStatus last = recorded(v1::RecordingStatus::COMPLETE, state).recording();
     api.on_stop_recording = [last] { return Result<v1::RecordingStatus>(last); };
     const test::VerbRun stopped = run(add_record, {"record", "--stop"});

@@ -13,6 +13,8 @@
 #include <fmt/ranges.h>
 #include <google/protobuf/util/json_util.h>
 
+#include "cli/hosts_words.h"
+
 namespace emberlock::cli {
 namespace {
 
@@ -38,6 +40,7 @@ std::string camera_line(const v1::CameraStatus& camera) {
   line += fmt::format("  {:<32}", sight(camera));
   if (camera.has_drift_ppm()) line += fmt::format(" {:+.2f} ppm", camera.drift_ppm());
   if (camera.has_time_left_s()) line += fmt::format(", {} left", seconds_in_words(camera.time_left_s()));
+  if (!camera.host().empty()) line += "  on " + camera.host();
   if (!camera.reason().empty()) line += fmt::format("  {}", camera.reason());
   while (line.back() == ' ') line.pop_back();
   return line + "\n";
@@ -278,6 +281,7 @@ std::string status_screen(const v1::DaemonStatus& status) {
            fmt::format("{}, {}{}{}", in_words(v1::Phase_Name(status.phase())), in_words(status.light()),
                        status.reason().empty() ? "" : ": ", status.reason()));
   add_line(text, "next", status.next_step());
+  if (!status.lent_to().empty()) add_line(text, "lent to", status.lent_to() + ": align and record there");
   if (status.has_alignment()) {
     const v1::AlignmentStatus& alignment = status.alignment();
     if (alignment.tolerance_s() > 0)
@@ -289,12 +293,15 @@ std::string status_screen(const v1::DaemonStatus& status) {
   if (status.has_recording()) {
     add_line(text, "recording", recording_line(status.recording()));
     add_line(text, "", status.recording().verdict());
+    for (const v1::HostPart& part : status.recording().hosts()) add_line(text, "", part_line(part));
   }
   if (status.has_live()) add_line(text, "live", live_line(status.live(), status.now_ns()));
   if (status.has_reconstruction()) add_line(text, "volume", reconstruction_line(status.reconstruction()));
   for (const v1::Job& job : status.jobs()) add_line(text, "job", job_line(job));
   if (!status.faults().empty()) text += "faults\n";
   for (const v1::Fault& fault : status.faults()) text += fault_lines(fault);
+  if (!status.hosts().empty()) text += "hosts\n";
+  for (const v1::HostStatus& host : status.hosts()) text += "  " + host_line(host) + "\n";
   if (!status.cameras().empty()) text += "cameras\n";
   for (const v1::CameraStatus& camera : status.cameras()) text += camera_line(camera);
   return text;

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
 #include <chrono>
 #include <cstdint>
 #include <cstdio>
@@ -10,6 +11,7 @@
 #include "cli/client.h"
 #include "cli/commands.h"
 #include "cli/daemon_words.h"
+#include "cli/hosts_words.h"
 #include "cli/interrupt.h"
 
 namespace emberlock::cli {
@@ -39,13 +41,20 @@ class Progressing {
     if (!json_ && !terminal_ && now < next_line_) return;
     next_line_ = now + std::chrono::seconds(1);
     const bool live = status.live().session() == status.recording().session();
-    print(status.recording(), live ? "; live: " + live_line(status.live(), status.now_ns()) : "");
+    std::string more = live ? "; live: " + live_line(status.live(), status.now_ns()) : "";
+    if (!status.recording().hosts().empty()) more += "; " + parts_in_words(status.recording());
+    print(status.recording(), more);
   }
-  /// Exits with code 1 if the counts don't add up.
+  /// Exits with code 1 if the counts don't add up, or another host's part is wanting.
   void conclude(const v1::RecordingStatus& recording) const {
     print(recording, "");
     if (!json_) std::printf("%s%s\n", terminal_ ? "\n" : "", recording.verdict().c_str());
-    if (recording.state() == v1::RecordingStatus::FAILED) throw CLI::RuntimeError(1);
+    const auto& hosts = recording.hosts();
+    for (const v1::HostPart& part : hosts)
+      if (!json_) std::printf("%s\n", part_line(part).c_str());
+    if (recording.state() == v1::RecordingStatus::FAILED ||
+        std::any_of(hosts.begin(), hosts.end(), is_wanting))
+      throw CLI::RuntimeError(1);
   }
 
  private:

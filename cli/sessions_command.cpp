@@ -12,6 +12,7 @@
 #include "cli/certificate_options.h"
 #include "cli/commands.h"
 #include "cli/daemon_words.h"
+#include "cli/hosts_words.h"
 #include "cli/interrupt.h"
 #include "cli/sessions_backup.h"
 #include "cli/sessions_daemon.h"
@@ -67,11 +68,12 @@ void print_table(const v1::ListSessionsResponse& sessions) {
       std::printf("%s unreadable: %s\n", padded(s.session()).c_str(), s.error().c_str());
       continue;
     }
-    std::printf("%s %-9s %-10s %-24s %2u cameras %8llu frames %6llu lost %12s%s\n",
+    const std::string hosts = hosts_in_words(s);
+    std::printf("%s %-9s %-10s %-24s %2u cameras %8llu frames %6llu lost %12s%s%s%s\n",
                 padded(s.session()).c_str(), v1::Manifest::State_Name(s.state()).c_str(), s.purpose().c_str(),
                 s.created_utc().c_str(), s.cameras(), static_cast<unsigned long long>(s.frames()),
                 static_cast<unsigned long long>(s.lost()), size_of(s.bytes()).c_str(),
-                s.calibrated() ? "  calibrated" : "");
+                s.calibrated() ? "  calibrated" : "", hosts.empty() ? "" : "  ", hosts.c_str());
   }
 }
 

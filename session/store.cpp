@@ -48,6 +48,13 @@ v1::ListSessionsResponse::Entry entry_of(const fs::path& folder) {
   entry.set_created_utc(manifest->created_utc());
   entry.set_cameras(static_cast<std::uint32_t>(manifest->cameras_size()));
   entry.set_calibrated(is_calibrated(*manifest));
+  const auto& hosts = manifest->hosts();
+  entry.set_hosts(static_cast<std::uint32_t>(hosts.size()));
+  entry.set_hosts_wanting(
+      static_cast<std::uint32_t>(std::count_if(hosts.begin(), hosts.end(), [](const v1::HostPart& part) {
+        return part.state() != v1::HostPart::WHOLE;
+      })));
+  entry.set_led_by(manifest->led_by());
   for (const v1::CameraStream& camera : manifest->cameras()) {
     const v1::Counts& c = camera.counts();
     const bool finished = manifest->state() != v1::Manifest::RECORDING;

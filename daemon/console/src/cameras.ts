@@ -5,6 +5,7 @@ import {arrange, wordsBelow, wordsBeside} from './arrange';
 import {el, Keyed, set, setText, show} from './dom';
 import {Enlarged} from './enlarged';
 import {plural} from './format';
+import {shortHost} from './hosts';
 import {cameraWithFlame} from './live_flame';
 import {Tile} from './tile';
 import type {Picture} from './wire';
@@ -20,7 +21,7 @@ export class Cameras {
   readonly enlarged = new Enlarged(() => this.wish());
   private readonly tiles = new Keyed<DaemonStatus['cameras'][number], Tile>(this.grid, id => this.make(id), (tile, camera) =>
     tile.show(camera, this.status?.alignment?.tolerance_s || undefined, camera.id === this.status?.alignment?.reset_next,
-              this.status !== undefined && cameraWithFlame(this.status) === camera.id));
+              this.status !== undefined && cameraWithFlame(this.status) === camera.id, shortHost(camera.host, this.status?.hosts ?? [])));
   private readonly visible = new Set<string>();
   private readonly sight = new IntersectionObserver(entries => {
     for (const entry of entries) {

@@ -32,6 +32,7 @@ export function facts(c: CameraStatus, tolerance: number | undefined): [string, 
     ['sensor', sensorWords[c.sensor]],
     ['model', c.model || '–'],
     ['driver', c.driver],
+    ...(c.host ? [['host', c.host] as [string, string]] : []),
   ];
   const n = c.counts;
   if (n) {

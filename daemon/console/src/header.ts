@@ -86,6 +86,7 @@ export class Header {
   private readonly link = el('span', {class: 'link', 'data-connection': 'connecting'}, 'connecting');
   private readonly faults = el('ul', {class: 'faults', 'aria-label': 'Faults', hidden: true});
   private readonly lines = new Keyed<Fault, FaultLine>(this.faults, id => new FaultLine(Number(id)), (line, fault) => line.show(fault, this.remedy(fault), this.now()));
+  private readonly lent = el('div', {class: 'lent', role: 'status', hidden: true});
   private readonly tally = el('span', {class: 'tally'});
   private readonly lost = el('div', {class: 'connection-lost', role: 'alert', hidden: true});
   private readonly live = el('div', {class: 'hidden', 'aria-live': 'assertive', id: 'announcements'});
@@ -103,7 +104,7 @@ export class Header {
         el('div', {class: 'phase'}, this.sign.root, el('div', {}, el('div', {class: 'words'}, this.phase, this.clock, this.light, this.tally), this.reason)),
         this.nextBox,
         el('div', {class: 'meta'}, this.link, this.rig, this.disk, this.time)),
-      this.faults, this.live);
+      this.lent, this.faults, this.live);
     setInterval(() => {
       this.showLost();
       for (const line of this.lines.views.values()) line.tick(this.now());
@@ -136,6 +137,8 @@ export class Header {
     const storage = status.storage;
     setText(this.disk, storage ? `disk ${storage.minutes_left >= 120 ? `${fixed(storage.minutes_left / 60, 1)} h` : `${fixed(storage.minutes_left, 0)} min`}` : '');
     setText(this.time, timeOfDay(status.now_utc));
+    show(this.lent, status.lent_to !== '');
+    setText(this.lent, status.lent_to && `These cameras are lent to ${status.lent_to}: align and record there.`);
     show(this.faults, status.faults.length > 0);
     this.lines.show([...status.faults].sort((a, b) => Number(a.over) - Number(b.over) || (a.light === b.light ? b.id - a.id : a.light === 'RED' ? -1 : 1)), fault => String(fault.id));
     document.title = `${phaseWords[status.phase]} – Emberlock`;

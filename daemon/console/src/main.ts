@@ -10,6 +10,7 @@ import {diagnostics} from './diagnostics';
 import {el, set, setText} from './dom';
 import {fixed} from './format';
 import {Header} from './header';
+import {Hosts} from './hosts';
 import {Journal} from './journal';
 import {Keys} from './keys';
 import {Link} from './link';
@@ -24,6 +25,7 @@ const header = new Header();
 const cameras: Cameras = new Cameras(wanted => link.watch(wanted));
 const record = new Record();
 const alignment = new Alignment();
+const hosts = new Hosts();
 const strobe = new Strobe();
 const reconstruction = new Reconstruction();
 const stylization = new Stylization();
@@ -47,7 +49,7 @@ const keys = new Keys([
 document.body.append(
   header.root, bar.root,
   el('main', {},
-    el('div', {class: 'rig-view'}, cameras.root, el('aside', {}, record.root, alignment.root, strobe.root)),
+    el('div', {class: 'rig-view'}, cameras.root, el('aside', {}, record.root, hosts.root, alignment.root, strobe.root)),
     stylization.root, reconstruction.root, sessions.root, journal.root),
   el('footer', {}, figures, el('button', {class: 'quiet', type: 'button', onclick: () => keys.help.showModal()}, 'Keys: ?')),
   cameras.enlarged.root, keys.help, token.root, complaints);
@@ -72,7 +74,7 @@ const link: Link = new Link({
     heard(status);
     const {phase, recording} = status;
     set(document.documentElement, 'data-filmed', phase === 'CAPTURING' || phase === 'FINISHING' ? recording?.purpose : undefined);
-    for (const part of [header, bar, cameras, record, alignment, strobe, stylization, reconstruction, sessions]) part.show(status);
+    for (const part of [header, bar, cameras, record, alignment, hosts, strobe, stylization, reconstruction, sessions]) part.show(status);
   },
   notice: notice => journal.add(notice),
   iteration(preview) {

@@ -4,6 +4,7 @@ import type {Counts, DaemonStatus, RecordingStatus} from './api.gen';
 import {act, TwoStep} from './act';
 import {el, set, setText, show} from './dom';
 import {bytes, clock, count, fixed, known, percent, short, span} from './format';
+import {Parts} from './hosts';
 import {LiveChoice} from './live_volumes';
 import {call} from './wire';
 
@@ -42,6 +43,7 @@ export class Record {
   private readonly queueWords = el('span');
   private readonly drops = el('p', {class: 'drops'});
   private readonly disk = el('p', {class: 'disk'});
+  private readonly parts = new Parts();
   private readonly verdict = el('p', {class: 'verdict', role: 'status'});
   private readonly name = el('input', {name: 'name', maxlength: 80, placeholder: 'by time', autocomplete: 'off', spellcheck: false,
                                        dir: 'auto', pattern: '([\\p{L}\\p{N}_:][\\p{L}\\p{M}\\p{N} ._:\\u200c\\u200d\\-]*)?',
@@ -62,7 +64,7 @@ export class Record {
     this.root = el('section', {id: 'record', class: 'panel', 'aria-labelledby': 'record-title'},
       el('h2', {id: 'record-title', class: 'hidden'}, 'Recording'),
       el('div', {class: 'record-line'}, this.button, el('div', {}, this.time, this.session)), this.hint,
-      this.disk, this.numbers, el('div', {class: 'queue'}, el('span', {}, 'queue'), this.queue, this.queueWords), this.drops, this.verdict,
+      this.disk, this.numbers, el('div', {class: 'queue'}, el('span', {}, 'queue'), this.queue, this.queueWords), this.drops, this.parts.root, this.verdict,
       el('details', {}, el('summary', {}, 'Name and length, live volumes'),
         el('div', {class: 'options'}, option('Name', this.name), option('Of', this.purpose), option('Seconds', this.seconds),
           option('Reconstruct it afterwards', this.reconstruct), ...this.live.options)));
@@ -92,6 +94,7 @@ export class Record {
     setText(this.session, recording?.session ?? '');
     set(this.root, 'data-recording', recording?.state);
     show(this.verdict, recording?.state === 'COMPLETE' || recording?.state === 'FAILED');
+    this.parts.show(recording);
     if (recording) this.showRecording(recording);
   }
 
@@ -137,7 +140,7 @@ export class Record {
     setText(this.queueWords, percent(r.queue_fill));
     const lost = drops(r.lost);
     set(this.drops, 'data-bad', lost.length > 0);
-    setText(this.drops, lost.length === 0 ? 'No frame lost' : `Lost: ${lost.map(([cause, frames]) => `${count(frames)} ${cause}`).join(', ')}`);
+    setText(this.drops, lost.length === 0 ? `No frame lost${r.hosts.length > 0 ? ' here' : ''}` : `Lost${r.hosts.length > 0 ? ' here' : ''}: ${lost.map(([cause, frames]) => `${count(frames)} ${cause}`).join(', ')}`);
     set(this.verdict, 'data-verdict', r.state);
     setText(this.verdict, r.verdict);
   }

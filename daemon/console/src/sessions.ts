@@ -11,9 +11,15 @@ import {call, follow} from './wire';
 
 export function sessionState(entry: Entry): [Light, string] {
   if (entry.error !== '') return ['RED', 'unreadable'];
-  if (entry.state === 'COMPLETE') return entry.lost > 0 ? ['AMBER', 'complete, frames lost'] : ['GREEN', 'complete'];
+  if (entry.state === 'COMPLETE') return entry.lost > 0 ? ['AMBER', 'complete, frames lost'] : [entry.hosts_wanting > 0 ? 'AMBER' : 'GREEN', `complete${entry.hosts > 0 ? ' here' : ''}`];
   if (entry.state === 'SALVAGED') return ['AMBER', 'salvaged'];
   return entry.state === 'RECORDING' ? ['AMBER', 'open'] : ['LIGHT_UNSPECIFIED', 'unknown'];
+}
+
+/** Where else it is: "2 other hosts, 1 part wanting"; of another host's recording: "led by lab-1". */
+export function hostsOf(entry: Entry): string {
+  return [entry.hosts > 0 && plural(entry.hosts, 'other host'), entry.hosts_wanting > 0 && `${plural(entry.hosts_wanting, 'part')} wanting`,
+          entry.led_by !== '' && `led by ${entry.led_by}`].filter(Boolean).join(', ');
 }
 
 const kinds: Record<Job_Kind, [string, string, string]> = {
@@ -94,6 +100,7 @@ class JobLine {
 class Row {
   private readonly sign = new Sign();
   private readonly state = el('span');
+  private readonly hosts = el('span', {class: 'hosts', hidden: true});
   private readonly cells = Array.from({length: 6}, () => el('td'));
   private readonly progress = el('progress', {max: 1, value: 0});
   private readonly doing = el('span', {role: 'status'});
@@ -133,7 +140,7 @@ class Row {
     const names = ['When', 'Of', 'Cameras', 'Frames', 'Lost', 'Size'];
     this.cells.forEach((cell, place) => set(cell, 'data-name', names[place]));
     this.root = el('tr', {'data-session': session},
-      el('th', {scope: 'row'}, el('bdi', {}, session), el('span', {class: 'state'}, this.sign.root, this.state), this.background), ...this.cells,
+      el('th', {scope: 'row'}, el('bdi', {}, session), el('span', {class: 'state'}, this.sign.root, this.state), this.hosts, this.background), ...this.cells,
       el('td', {class: 'actions'}, el('div', {}, ...this.buttons, this.stylize, this.reconstruct, this.frame.root, this.quantity.root), this.job));
   }
 
@@ -142,6 +149,10 @@ class Row {
     const [light, word] = sessionState(entry);
     this.sign.show(light);
     setText(this.state, entry.error ? `${word}: ${entry.error}` : word);
+    const hosts = hostsOf(entry);
+    show(this.hosts, hosts !== '');
+    setText(this.hosts, hosts);
+    set(this.hosts, 'data-wanting', entry.hosts_wanting > 0);
     [dateAndTime(entry.created_utc), entry.purpose, count(entry.cameras), count(entry.frames), count(entry.lost), bytes(entry.bytes)]
       .forEach((text, place) => setText(this.cells[place]!, text));
     set(this.cells[4]!, 'data-bad', entry.lost > 0);
@@ -210,11 +221,12 @@ export class Sessions {
       el('div', {class: 'scroll'}, el('table', {}, el('thead', {}, el('tr', {}, ...heads.map(head => el('th', {scope: 'col'}, head)))), this.body)));
   }
 
-  /** Read again when a recording came, went or changed its state, or something was done to a session. */
+  /** Read again when a recording, or another host's part of one, came, went or changed its state, or something was done to a session. */
   show(status: DaemonStatus): void {
     this.jobs = status.jobs;
     this.showJobs();
-    const key = `${status.recording?.session} ${status.recording?.state} ${status.jobs.map(job => `${job.kind} ${job.session}`).join()}`;
+    const wanting = status.hosts.map(host => host.parts_wanting).join();
+    const key = `${status.recording?.session} ${status.recording?.state} ${status.recording?.hosts.map(part => part.state).join()} ${wanting} ${status.jobs.map(job => `${job.kind} ${job.session}`).join()}`;
     if (key === this.shown) return;
     this.shown = key;
     void this.refresh();

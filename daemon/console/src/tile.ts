@@ -12,6 +12,7 @@ export class Tile {
   camera?: CameraStatus;
   private readonly sign = new Sign();
   private readonly word = el('span', {class: 'word'});
+  private readonly hosts = [el('span', {class: 'at', hidden: true}), el('span', {class: 'at', hidden: true})] as const;  // beside its error, or its name where that isn't shown
   private readonly overlay = new Overlay();
   private readonly gauge = new Gauge();
   private readonly error = el('span', {class: 'error-rows'});
@@ -31,9 +32,9 @@ export class Tile {
     this.root = el('div', {class: 'tile', tabindex: 0, role: 'button', 'data-camera': id, onclick: () => open(id)},
       this.frame,
       el('div', {class: 'facts'},
-        el('header', {}, this.sign.root, el('h3', {}, id), this.word),
+        el('header', {}, this.sign.root, el('h3', {}, el('span', {}, id), ' ', this.hosts[1]), this.word),
         this.reason,
-        el('div', {class: 'error'}, this.error, this.time),
+        el('div', {class: 'error'}, this.error, el('span', {class: 'error-more'}, this.time, this.hosts[0])),
         this.gauge.root,
         el('dl', {},
           el('div', {}, el('dt', {}, 'drift'), this.drift),
@@ -47,11 +48,16 @@ export class Tile {
     });
   }
 
-  /** `next`: somebody is to reset it now; `flame`: one is drawn into its pictures. */
-  show(camera: CameraStatus, tolerance: number | undefined, next: boolean, flame: boolean): void {
+  /** `next`: somebody is to reset it now; `flame`: one is drawn into its pictures; `host`: that has it, empty for this one. */
+  show(camera: CameraStatus, tolerance: number | undefined, next: boolean, flame: boolean, host: string): void {
     this.camera = camera;
     const word = cameraWord(camera, tolerance);
     showSign(this.sign, this.word, camera.light, word);
+    for (const each of this.hosts) {
+      show(each, host !== '');
+      setText(each, host);
+      set(each, 'title', camera.host || undefined);
+    }
     set(this.root, 'data-light', camera.light);
     set(this.root, 'data-state', camera.state);
     set(this.root, 'data-next', next);

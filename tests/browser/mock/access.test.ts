@@ -48,9 +48,15 @@ describe.each([kSizes[0], kPhone])('axe at $width x $height', size => {
       recording: {...faultyCapturing(7.3), reconstruction: reconstruction(3)},
       locked: {...locked(), faults: [], recording: {...capturing(8).recording!, state: 'COMPLETE' as const, verdict: '2112 frames, all accounted for.'}},
       'a sequence': {...locked(), reconstruction: sequence('dfdr--')},
-      refused: {...noLamp(), alignment: alignment(0, {verdict: 'REFUSED', reason: '10 rows would take about 400 resets; 60 are allowed.', offers})},
+      'several hosts': {...locked(), hosts: [{host: 'lab-2:7143', light: 'GREEN' as const, reason: 'answers', connected: true, cameras: 1, clock_ahead_s: 5, clock_sigma_s: 8e-5, round_trip_s: 1.6e-4, parts_wanting: 0},
+                                             {host: 'lab-3:7143', light: 'RED' as const, reason: 'it does not answer', connected: false, cameras: 0, clock_sigma_s: 0, round_trip_s: 0, parts_wanting: 1}],
+                        cameras: locked().cameras!.map((each, index) => ({...each, host: index === 10 ? 'lab-2:7143' : ''})),
+                        recording: {...capturing(8).recording!, state: 'COMPLETE' as const, hosts: [
+                          {host: 'lab-3:7143', session: 'candle 1', camera_ids: ['far'], state: 'MISSING' as const, why: 'it does not answer', clock: [], frames: 0, lost: 0}]}},
+      lent: {...idle(), hosts: [], lent_to: 'dome at lab-1'},
+      refused: {...noLamp(), lent_to: '', alignment: alignment(0, {verdict: 'REFUSED', reason: '10 rows would take about 400 resets; 60 are allowed.', offers})},
     };
-    for (const [words, status] of Object.entries(states).filter(([words]) => size !== kPhone || ['recording', 'refused', 'a sequence'].includes(words))) {
+    for (const [words, status] of Object.entries(states).filter(([words]) => size !== kPhone || ['recording', 'refused', 'a sequence', 'several hosts', 'lent'].includes(words))) {
       rig.mock.show(status);
       rig.mock.notice('AMBER', words);
       await page.waitForFunction(last => document.querySelector('.journal li')?.textContent?.endsWith(last), words);

@@ -19,7 +19,9 @@ export class Refusal extends Error {
   }
 }
 
-type Answers = {[M in keyof Calls]?: (request: Calls[M][0]) => Partial<Calls[M][1]> | Promise<Partial<Calls[M][1]>>};
+/** As protobuf's JSON has it: what is its default may be left out. */
+type Told<T> = T extends (infer Item)[] ? Told<Item>[] : T extends object ? {[K in keyof T]?: Told<T[K]>} : T;
+type Answers = {[M in keyof Calls]?: (request: Calls[M][0]) => Told<Calls[M][1]> | Promise<Told<Calls[M][1]>>};
 type Jobs = Partial<Record<string, (request: Record<string, unknown>) => AsyncIterable<object>>>;
 
 interface Watcher {

@@ -20,7 +20,7 @@ export function errorAfter(index: number, round: number): number {
 export function camera(index: number, change: Wire<CameraStatus> = {}): CameraStatus {
   return {
     id: cameraId(index), model: 'virtual CCD', driver: 'virtual', state: 'FILMING', light: 'GREEN', reason: 'Films.', width: 640, height: 480,
-    frame_rate_hz: 24, measured_rate_hz: 24.0003, reset: 'BY_HAND', sensor: 'CCD', sight: '', resets: 0, reset_next: false, dots: [], band: [], lost_lately: 0,
+    frame_rate_hz: 24, measured_rate_hz: 24.0003, reset: 'BY_HAND', sensor: 'CCD', sight: '', resets: 0, reset_next: false, dots: [], band: [], lost_lately: 0, host: '',
     counts: {delivered: 7321, damaged: 0, camera_gap: 0, transport: 0, resend: 0, underrun: 0, queue: 0, passed_over: 240},
     ...change,
   };
@@ -83,7 +83,7 @@ export function capturing(seconds: number, change: Wire<RecordingStatus> = {}): 
   return {...locked(), phase: 'CAPTURING', light: 'GREEN', reason: 'Records all 11 cameras.', next_step: '',
           recording: {session: '2026-11-22_031500', state: 'RECORDING', purpose: 'flame', seconds, frames, bytes: frames * 307200, bytes_per_s: 81.1e6, queue_fill: 0.07,
                       progress: {arrived: frames + 66, queued: 11, written: frames + 55, safe: frames, at_risk_s: 0.3},
-                      lost: {recorded: frames, camera_gap: 0, transport: 0, underrun: 0, queue: 0, disk: 0, passed_over: 0}, cameras: [], camera_progress: [], verdict: '', spread_s: 2.2e-3, ...change}};
+                      lost: {recorded: frames, camera_gap: 0, transport: 0, underrun: 0, queue: 0, disk: 0, passed_over: 0}, cameras: [], camera_progress: [], verdict: '', spread_s: 2.2e-3, hosts: [], ...change}};
 }
 
 export function reconstruction(iterations: number, change: Wire<ReconstructionStatus> = {}): ReconstructionStatus {

@@ -132,6 +132,33 @@ TEST(SessionStore, ASessionWithEveryCalibrationAndItsBoxCanBeReconstructed) {
   EXPECT_TRUE(store.list().sessions(0).calibrated());
 }
 
+TEST(SessionStore, OfSeveralHostsTellsHowManyHavePartsHowManyAreWantingAndWhoLed) {
+  const TempFolder temp;
+  const SessionStore store = store_in(temp);
+  auto led = manifest_of({kStoredLayout});
+  led.set_created_utc("2026-11-22T03:00:00Z");
+  for (const auto state : {v1::HostPart::WHOLE, v1::HostPart::MISSING, v1::HostPart::SHORT,
+                           v1::HostPart::WHOLE, v1::HostPart::RECORDING})
+    led.add_hosts()->set_state(state);
+  auto part = manifest_of({kStoredLayout});
+  part.set_created_utc("2026-11-22T02:00:00Z");
+  part.set_led_by("dome at lab-1");
+  ASSERT_TRUE(SessionWriter::create(store.folder() / "led", led, small_disk_options())->finish());
+  ASSERT_TRUE(SessionWriter::create(store.folder() / "part", part, small_disk_options())->finish());
+  record(store.folder() / "alone", kStoredLayout, 1, small_disk_options());
+
+  const auto list = store.list();
+  ASSERT_EQ(list.sessions_size(), 3);
+  EXPECT_EQ(list.sessions(0).session(), "led");
+  EXPECT_EQ(list.sessions(0).hosts(), 5U);
+  EXPECT_EQ(list.sessions(0).hosts_wanting(), 3U);
+  EXPECT_EQ(list.sessions(0).led_by(), "");
+  EXPECT_EQ(list.sessions(0).cameras(), 1U) << "those whose frames are here";
+  EXPECT_EQ(list.sessions(1).hosts(), 0U);
+  EXPECT_EQ(list.sessions(1).led_by(), "dome at lab-1");
+  EXPECT_EQ(list.sessions(2).hosts() + list.sessions(2).hosts_wanting(), 0U);
+}
+
 TEST(SessionStore, NamesThatLeadElsewhereAreRefusedForOldAndNewSessions) {
   const TempFolder temp;
   const SessionStore store = store_in(temp);

@@ -242,6 +242,9 @@ std::vector<v1::PartRequest> Conductor::part_requests(v1::Manifest& manifest,
 
 void Conductor::watch_hosts() {
   for (const PartNews& news : parts_.hosts.news()) {
+    if (recording_ && recording_->session() == news.session)
+      for (v1::HostPart& shown : *recording_->mutable_hosts())
+        if (shown.host() == news.part.host()) shown = news.part;
     const FaultKey key{v1::Fault::PART_WANTING, news.session + " at " + news.part.host()};
     const bool wanting =
         news.part.state() == v1::HostPart::MISSING || news.part.state() == v1::HostPart::SHORT;
@@ -262,9 +265,9 @@ void Conductor::describe_hosts(v1::DaemonStatus& status) const {
       if (parts_.rig.host(i) == host.host()) host.set_cameras(host.cameras() + 1);
     *status.add_hosts() = std::move(host);
   }
-  if (!status.has_recording() || !parts_.hosts.any()) return;
-  for (v1::HostPart& part : parts_.hosts.of(record_folder_))
-    *status.mutable_recording()->add_hosts() = std::move(part);
+  if (!status.has_recording()) return;
+  const std::vector<v1::HostPart> parts = parts_.hosts.of(record_folder_);
+  if (!parts.empty()) status.mutable_recording()->mutable_hosts()->Assign(parts.begin(), parts.end());
 }
 
 }  // namespace emberlock::daemon

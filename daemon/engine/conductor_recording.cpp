@@ -251,6 +251,7 @@ void Conductor::conclude_recording(v1::RecordingStatus status) {
     status.set_verdict(words(outcome));
   }
   if (spread_) status.set_spread_s(spread_->value());
+  if (manifest) *status.mutable_hosts() = manifest->hosts();
   parts_.jobs.resume();
   // What an end that failed left behind; the other is compressed.
   const rig::RecordingConfig::Transcode transcode = parts_.config.recording.transcode;

@@ -73,6 +73,7 @@ void HostParts::begin(Part& part, const std::filesystem::path& folder) {
   const auto begun = part.host->record(std::move(request));
   if (!begun.ok()) return set(part.known, v1::HostPart::MISSING, begun.error().message());
   part.known.set_session(begun->session());
+  part.late = from - TimePoint{part.request->from_ns()};
   set(part.known, v1::HostPart::RECORDING, "");
   if (part.known.clock_size() == 0) read_clock(*part.host, part.known);
 }
@@ -196,6 +197,9 @@ void HostParts::settle(const Take& take, const v1::HostPart& there, Part& part) 
   if (take.restarted) return set(part.known, v1::HostPart::WHOLE, "");
   if (!take.ended) return set(part.known, v1::HostPart::SHORT, "it ended before the recording did");
   const Seconds early = *take.ended - part.host->here({there.until_ns()});
+  if (part.late > kShort)
+    return set(part.known, v1::HostPart::SHORT,
+               fmt::format("its frames begin {:.1f} s after the recording does", part.late.value()));
   if (early > kShort)
     return set(part.known, v1::HostPart::SHORT,
                fmt::format("its frames end {:.1f} s before the recording does", early.value()));

@@ -65,6 +65,7 @@ class HostParts {
     std::shared_ptr<RemoteHost> host;        ///< null: it isn't one of the rig's any more
     std::optional<v1::PartRequest> request;  ///< to begin it with; absent after a restart
     v1::HostPart known;
+    Seconds late{0};  ///< it began so much after the recording
     bool settled = false;
     bool wanting = false;  ///< as it was told
   };

@@ -317,10 +317,16 @@ TEST_F(HostPartsTest, OneThatCantBeginIsMissingAndBeginsWhenItCan) {
   EXPECT_EQ(parts.hosts()[0].parts_wanting(), 1U);
   EXPECT_TRUE(any_news(parts, v1::HostPart::MISSING));
   {
+    SteadyClock().sleep_until(SteadyClock().now() + milliseconds(600));
     const std::lock_guard lock(lender.mutex);
     lender.refuses = false;
   }
   EXPECT_TRUE(any_news(parts, v1::HostPart::RECORDING));
+  SteadyClock().sleep_until(SteadyClock().now() + milliseconds(600));
+  parts.end(folder, SteadyClock().now());
+  ASSERT_TRUE(parts.close(folder, Seconds(10)).ok());
+  EXPECT_EQ(kept().state(), v1::HostPart::SHORT);
+  EXPECT_THAT(kept().why(), HasSubstr("after the recording does"));
 }
 
 TEST_F(HostPartsTest, OneWhoseHostIsAwayIsMissingAndKnownWhenItIsBack) {

@@ -70,7 +70,7 @@ TEST(Config, WhatTheFileLeavesToTheMachineIsFilledIn) {
 
 TEST(Config, WhatIsPrintedIsReadAgain) {
   std::string text = uncommented();
-  text = std::regex_replace(text, std::regex("controls = .*"), "");  // of real cameras alone
+  text = std::regex_replace(text, std::regex("\n(controls|host) = .*"), "");  // of others than simulated cameras
   const ConfigReading once = read_config(text, "/etc/emberlock/emberlockd.toml");
   ASSERT_TRUE(once.problems.empty()) << once.problems.front().message();
   const std::string printed = print_config(once.config);
@@ -84,7 +84,7 @@ TEST(Config, TheCommentedFileExplainsEveryKeyWithRangeAndDefault) {
       text,
       HasSubstr(
           "# Duration of one flash of the strobe. A number from 0.1 to 10000.\n#flash_width_us = 20\n"));
-  EXPECT_THAT(text, HasSubstr("\"virtual\", \"v4l2\", \"aravis\", \"ptp\" or \"replay\""));
+  EXPECT_THAT(text, HasSubstr("\"virtual\", \"v4l2\", \"aravis\", \"ptp\", \"replay\" or \"remote\""));
 }
 
 TEST(Config, AStrobeMayBeSetByHand) {
@@ -180,13 +180,48 @@ TEST(Config, AValueOutOfRangeIsNamedWithPlaceRangeAndRemedy) {
               HasSubstr("lab.toml:3:8: size is \"640 x 480\". Give WIDTHxHEIGHT"));
 }
 
+const std::string kOwnCamera = "[[rig.camera]]\ndriver = \"v4l2\"\nid = \"here\"\n";
+const std::string kIdentity = "certificate = \"a\"\nkey = \"b\"\nauthority = \"c\"\n";
+std::string remote_camera(const std::string& keys) { return "[[rig.camera]]\ndriver = \"remote\"\n" + keys; }
+
+TEST(Config, AnotherHostsCameraNeedsItsHostItsIdAndCertificates) {
+  const std::string hosts = "[hosts]\n" + kIdentity;
+  const DaemonConfig config =
+      parsed(kOwnCamera + remote_camera("id = \"there\"\nhost = \"lab-2:7143\"\n") + hosts);
+  EXPECT_EQ(config.rig.cameras[1].source, CameraSource::remote);
+  EXPECT_EQ(config.rig.cameras[1].host, "lab-2:7143");
+  EXPECT_EQ(config.hosts.alone, Seconds(600));
+  EXPECT_TRUE(config.hosts.key.is_absolute());
+  EXPECT_THAT(problem(kOwnCamera + remote_camera("id = \"there\"\n") + hosts), HasSubstr("the camera has no host"));
+  EXPECT_THAT(problem(kOwnCamera + remote_camera("id = \"there\"\nhost = \"lab-2\"\n") + hosts),
+              HasSubstr("\"lab-2\" is no address"));
+  EXPECT_THAT(problem(kOwnCamera + remote_camera("host = \"lab-2:7143\"\n") + hosts),
+              HasSubstr("the camera has no id"));
+  EXPECT_THAT(problem(kOwnCamera + remote_camera("id = \"here\"\nhost = \"lab-2:7143\"\n") + hosts),
+              HasSubstr("two cameras have the id \"here\""));
+  EXPECT_THAT(problem(remote_camera("id = \"there\"\nhost = \"lab-2:7143\"\n") + hosts),
+              HasSubstr("all cameras are other hosts'"));
+  EXPECT_THAT(problem(kOwnCamera + remote_camera("id = \"there\"\nhost = \"lab-2:7143\"\n")),
+              HasSubstr("driver \"remote\" needs certificate"));
+  EXPECT_THAT(problem(kOwnCamera + "host = \"lab-2:7143\"\n"), HasSubstr("host means nothing here"));
+}
+
+TEST(Config, AHostLendsWithCertificatesAndLeadsNone) {
+  EXPECT_TRUE(parsed(kOwnCamera + "[hosts]\nlisten = \"0.0.0.0:7143\"\n" + kIdentity).hosts.listen.ends_with("7143"));
+  EXPECT_THAT(problem(kOwnCamera + "[hosts]\nlisten = \"0.0.0.0:7143\"\n"), HasSubstr("listen needs certificate"));
+  EXPECT_THAT(problem(kOwnCamera + "[hosts]\nlisten = \"here\"\n" + kIdentity), HasSubstr("is no address"));
+  EXPECT_THAT(problem(kOwnCamera + remote_camera("id = \"there\"\nhost = \"lab-2:7143\"\n") +
+                      "[hosts]\nlisten = \"0.0.0.0:7143\"\n" + kIdentity),
+              HasSubstr("lends none"));
+}
+
 TEST(Config, AnUnknownKeyIsAnErrorThatSuggestsTheNearest) {
   EXPECT_EQ(problem("[alignment]\ntolerence = \"100rows\"\n"),
             "lab.toml:2:1: there is no key \"tolerence\" in [alignment]. Did you mean tolerance?");
   EXPECT_EQ(problem("[recordings]\n"),
             "lab.toml:1:2: there is no section \"recordings\". Did you mean recording?");
   EXPECT_THAT(problem("[[rig.camera]]\ndriver = \"ptp\"\nid = \"a\"\nquux = 1\n"),
-              HasSubstr("no key \"quux\" in [rig.camera]. There are driver, id, count"));
+              HasSubstr("no key \"quux\" in [rig.camera]. There are driver, id, host, count"));
   EXPECT_THAT(problem("[rig.strope]\n"), HasSubstr("Did you mean strobe?"));
 }
 

@@ -63,7 +63,8 @@ class Join : public testing::Test {
   }
   [[nodiscard]] std::vector<std::string> camera_ids() const {
     std::vector<std::string> ids;
-    for (const v1::CameraStream& camera : read_manifest(out_)->cameras()) ids.push_back(camera.camera_id());
+    const v1::Manifest manifest = test::checked(read_manifest(out_));
+    for (const v1::CameraStream& camera : manifest.cameras()) ids.push_back(camera.camera_id());
     return ids;
   }
   void expect_whole() const {

@@ -71,7 +71,7 @@ void HostParts::begin(Part& part, const std::filesystem::path& folder) {
   request.set_from_ns(part.host->there(from).ns);
   request.set_name(folder.filename().string());
   const auto begun = part.host->record(std::move(request));
-  if (!begun.ok()) return set(part.known, v1::HostPart::MISSING, begun.error().message());
+  if (!begun.ok()) return set(part.known, v1::HostPart::MISSING, begun.error().what);
   part.known.set_session(begun->session());
   part.late = from - TimePoint{part.request->from_ns()};
   set(part.known, v1::HostPart::RECORDING, "");
@@ -212,12 +212,12 @@ HostParts::Part HostParts::asked(const Take& take, Part part) {
     return part;
   }
   if (!part.host->connected()) {
-    set(part.known, v1::HostPart::MISSING, part.host->status().reason());
+    set(part.known, v1::HostPart::MISSING, part.host->trouble());
     return part;
   }
   const auto there = part.host->part(take.session_id, part.known.session());
   if (!there.ok()) {
-    set(part.known, v1::HostPart::MISSING, there.error().message());
+    set(part.known, v1::HostPart::MISSING, there.error().what);
   } else if (!*there && !take.ended && part.request) {
     begin(part, take.folder);
   } else if (!*there) {

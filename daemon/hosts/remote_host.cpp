@@ -25,6 +25,12 @@ std::chrono::system_clock::time_point in(Seconds time) {
              std::chrono::duration<double>(time.value()));
 }
 
+/// Beside the host's name.
+std::string said(Error error) {
+  error.where.clear();
+  return error.message();
+}
+
 }  // namespace
 
 Result<std::shared_ptr<grpc::Channel>> channel_to(const std::string& address,
@@ -111,13 +117,18 @@ bool RemoteHost::connected() const {
   return answer_.ok();
 }
 
+std::string RemoteHost::trouble() const {
+  const std::lock_guard lock(mutex_);
+  return answer_.ok() ? std::string() : answer_.error().what;
+}
+
 v1::HostStatus RemoteHost::status() const {
   const std::lock_guard lock(mutex_);
   v1::HostStatus status;
   status.set_host(address_);
   status.set_connected(answer_.ok());
   status.set_light(answer_.ok() ? v1::GREEN : v1::RED);
-  status.set_reason(answer_.ok() ? "answers" : answer_.error().message());
+  status.set_reason(answer_.ok() ? "answers" : said(answer_.error()));
   if (const auto reading = offset_.reading(SteadyClock().now())) {
     status.set_clock_ahead_s(1e-9 * static_cast<double>(reading->ahead_ns()));
     status.set_clock_sigma_s(1e-9 * static_cast<double>(reading->sigma_ns()));

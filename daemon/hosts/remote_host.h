@@ -39,6 +39,8 @@ class RemoteHost {
 
   [[nodiscard]] const std::string& address() const { return address_; }
   [[nodiscard]] bool connected() const;
+  /// Why it isn't.
+  [[nodiscard]] std::string trouble() const;
   /// Its light, reason and clock.
   [[nodiscard]] v1::HostStatus status() const;
   /// Its clock against this one's at `at`.

@@ -253,7 +253,7 @@ void Conductor::watch_hosts() {
     } else {
       static_cast<void>(happen(FaultMended{key}));
       if (news.part.state() == v1::HostPart::WHOLE)
-        note({v1::GREEN, Remark::Code::part_known, news.session, HostPartIs{news.part}});
+        note({v1::GREEN, Remark::Code::recorded, news.session, HostPartIs{news.part}});
     }
   }
 }

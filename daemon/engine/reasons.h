@@ -136,7 +136,7 @@ struct Remark {
   enum class Code {
     recording,
     recording_ends,
-    recorded,
+    recorded,       ///< here, or another host's part
     not_handed_on,  ///< for reconstruction
     replay_over,    ///< of a camera
     flashes_show,   ///< in the recording: nobody but an operator can switch the strobe off
@@ -147,7 +147,6 @@ struct Remark {
     compressed,
     not_compressed,  ///< cancelled
     not_salvaged,
-    part_known,  ///< another host's, of a recording
     fault,
     fault_over,
     last = fault_over,

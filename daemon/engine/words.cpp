@@ -238,7 +238,6 @@ std::string words(const Remark& remark) {
     case Code::recording_ends:
       return fmt::format("recording {} ends: {}", subject, why);
     case Code::recorded:
-    case Code::part_known:
     case Code::not_salvaged:
       return with_subject(subject, why);
     case Code::not_handed_on:

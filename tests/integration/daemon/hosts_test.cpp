@@ -1,9 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // Several hosts as one rig: an emberlockd each, in a network namespace of its own and with a clock of its own.
 #include <chrono>
-#include <csignal>
+#include <functional>
 #include <filesystem>
-#include <fstream>
 #include <memory>
 #include <string>
 #include <thread>
@@ -17,9 +16,8 @@
 #include "session/reader.h"
 #include "session/verify.h"
 #include "tests/support/certificate.h"
-#include "tests/support/host_network.h"
+#include "tests/support/lab_hosts.h"
 #include "tests/support/recording.h"
-#include "tests/support/shell.h"
 
 namespace emberlock {
 namespace {
@@ -29,104 +27,22 @@ using ::testing::HasSubstr;
 using ::testing::Not;
 
 constexpr int kCamerasAHost = 2;
-
-void write(const fs::path& file, const std::string& text) {
-  std::ofstream(file) << text;
-  fs::permissions(file, fs::perms::owner_read | fs::perms::owner_write);
-}
-
-/// One host: its network, its clock, its folder, its emberlockd.
-class Host {
- public:
-  Host(const fs::path& folder, int number, const test::HostNetwork& network,
-       const test::CertificateAuthority& authority)
-      : folder_(folder / ("host-" + std::to_string(number))), number_(number), network_(network) {
-    fs::create_directories(folder_);
-    const rig::TlsIdentity own = authority.issue(test::HostNetwork::address(number));
-    write(folder_ / "host.crt", own.certificate);
-    write(folder_ / "host.key", own.key);
-    write(folder_ / "hosts.crt", authority.pem());
-    text_ = "[rig]\nname = \"dome\"\n[[rig.camera]]\ndriver = \"virtual\"\nid = \"" + camera() +
-            "\"\ncount = 2\nsize = \"160x120\"\n[rig.virtual]\nlight = \"" + (folder / "light").string() +
-            "\"\n[recording]\nfolder = \"" + sessions().string() +
-            "\"\nfree_space_floor_mib = 0\nencoding = \"raw\"\ntranscode = \"never\"\n[server]\nsocket = \"" +
-            (folder_ / "run" / "d.sock").string() +
-            "\"\nhttp_listen = \"\"\n[hosts]\ncertificate = \"host.crt\"\nkey = \"host.key\"\n"
-            "authority = \"hosts.crt\"\n";
-  }
-  Host(const Host&) = delete;
-  Host& operator=(const Host&) = delete;
-  ~Host() { kill(); }
-
-  [[nodiscard]] fs::path sessions() const { return folder_ / "sessions"; }
-  [[nodiscard]] std::string camera() const { return std::string(1, static_cast<char>('a' + number_)); }
-  [[nodiscard]] std::string address() const { return test::HostNetwork::address(number_) + ":7143"; }
-  void lends() { text_ += "listen = \"" + address() + "\"\n"; }
-  void leads(const std::vector<std::unique_ptr<Host>>& others) {
-    text_ += "[rig.strobe]\ndriver = \"virtual\"\n";
-    std::string cameras;
-    for (const auto& other : others)
-      for (int i = 0; i < kCamerasAHost; ++i)
-        cameras += "[[rig.camera]]\ndriver = \"remote\"\nhost = \"" + other->address() + "\"\nid = \"" +
-                   other->camera() + "-0" + std::to_string(i) + "\"\n";
-    const auto at = text_.find("[rig.virtual]");
-    text_.insert(at, cameras);
-  }
-  /// Its monotonic clock is a thousand seconds ahead for each host before it.
-  void start() {
-    write(folder_ / "d.toml", text_);
-    pid_ = ::fork();
-    if (pid_ != 0) return;
-    network_.enter(number_);
-    const std::string ahead = std::to_string(1000 * number_);
-    const std::string config = (folder_ / "d.toml").string();
-    ::execlp("unshare", "unshare", "--time", "--monotonic", ahead.c_str(), "--fork", "--kill-child",
-             EMBERLOCKD_PROGRAM, "--config", config.c_str(), nullptr);
-    ::_exit(127);
-  }
-  /// The program that made its clock goes first, and takes it along.
-  void kill() {
-    if (pid_ <= 0) return;
-    const std::string pid = std::to_string(pid_);
-    std::string daemon;
-    std::ifstream("/proc/" + pid + "/task/" + pid + "/children") >> daemon;
-    ::kill(pid_, SIGKILL);
-    ::waitpid(pid_, nullptr, 0);
-    pid_ = -1;
-    while (!daemon.empty() && fs::exists("/proc/" + daemon))
-      std::this_thread::sleep_for(std::chrono::milliseconds(10));
-  }
-  [[nodiscard]] Shell client(const std::string& words) const {
-    return shell(std::string(EMBERLOCK_PROGRAM) + " " + words +
-                 " --daemon unix:" + (folder_ / "run" / "d.sock").string());
-  }
-  [[nodiscard]] bool answers(const std::string& question, const std::string& words) const {
-    const auto end = std::chrono::steady_clock::now() + std::chrono::minutes(2);
-    while (std::chrono::steady_clock::now() < end) {
-      if (client(question).output.find(words) != std::string::npos) return true;
-      std::this_thread::sleep_for(std::chrono::milliseconds(100));
-    }
-    ADD_FAILURE() << client(question).output;
-    return false;
-  }
-
- private:
-  fs::path folder_;
-  int number_;
-  const test::HostNetwork& network_;
-  std::string text_;
-  pid_t pid_ = -1;
-};
+using test::write_private;
 
 class Hosts : public ::testing::Test {
  protected:
+  [[nodiscard]] std::unique_ptr<test::LabHost> make_host(int number) const {
+    return std::make_unique<test::LabHost>(
+        test::LabHost::Setup{temp_.path(), number, kCamerasAHost, "320x240"}, *network_, authority_,
+        test::LabHost::Programs{EMBERLOCKD_PROGRAM, EMBERLOCK_PROGRAM});
+  }
   void begin(int others) {
     if (::geteuid() != 0) GTEST_SKIP() << "network namespaces need root";
     network_ = std::make_unique<test::HostNetwork>(others + 1);
     ASSERT_EQ(network_->trouble(), "");
-    leader_ = std::make_unique<Host>(temp_.path(), 0, *network_, authority_);
+    leader_ = make_host(0);
     for (int i = 1; i <= others; ++i) {
-      others_.push_back(std::make_unique<Host>(temp_.path(), i, *network_, authority_));
+      others_.push_back(make_host(i));
       others_.back()->lends();
     }
     leader_->leads(others_);
@@ -156,7 +72,7 @@ class Hosts : public ::testing::Test {
       return true;
     });
   }
-  [[nodiscard]] v1::Manifest manifest(const Host& host, const std::string& session) const {
+  [[nodiscard]] v1::Manifest manifest(const test::LabHost& host, const std::string& session) const {
     const auto read = session::read_manifest(host.sessions() / session);
     EXPECT_TRUE(read.ok()) << (read.ok() ? "" : read.error().message());
     return read.ok() ? *read : v1::Manifest();
@@ -165,8 +81,8 @@ class Hosts : public ::testing::Test {
   test::TempFolder temp_;
   test::CertificateAuthority authority_{"who signs hosts"};
   std::unique_ptr<test::HostNetwork> network_;
-  std::unique_ptr<Host> leader_;
-  std::vector<std::unique_ptr<Host>> others_;
+  std::unique_ptr<test::LabHost> leader_;
+  std::vector<std::unique_ptr<test::LabHost>> others_;
 };
 
 TEST_F(Hosts, TwoAreLockedByOneStrobeAndRecordOneSession) {
@@ -191,7 +107,7 @@ TEST_F(Hosts, TwoAreLockedByOneStrobeAndRecordOneSession) {
   const v1::Manifest there = manifest(*others_[0], "take");
   EXPECT_EQ(there.session_id(), whole.session_id());
   EXPECT_THAT(there.led_by(), HasSubstr("dome at"));
-  for (const Host* host : {leader_.get(), others_[0].get()}) {
+  for (const test::LabHost* host : {leader_.get(), others_[0].get()}) {
     const auto check = session::verify_session(host->sessions() / "take");
     ASSERT_TRUE(check.ok()) << check.error().message();
     EXPECT_TRUE(check->whole()) << check->to_do;
@@ -265,8 +181,8 @@ TEST_F(Hosts, WhoHasNoCertificateOfTheirsIsntLetIn) {
   const test::CertificateAuthority foreign("somebody else");
   const rig::TlsIdentity stranger = foreign.issue(test::HostNetwork::address(0));
   const fs::path folder = temp_ / "host-0";
-  write(folder / "host.crt", stranger.certificate);
-  write(folder / "host.key", stranger.key);
+  write_private(folder / "host.crt", stranger.certificate);
+  write_private(folder / "host.key", stranger.key);
   leader_->kill();
   leader_->start();
   EXPECT_TRUE(until([](const nlohmann::json& now) {

@@ -115,7 +115,8 @@ TEST_F(Join, FilesOfCamerasAreCopiedAsTheyAre) {
   record(test::three_hosts());
   join_well();
   for (std::size_t i = 0; i < parts_.size(); ++i) {
-    for (const std::string& id : test::three_hosts()[i].cameras) {
+    const std::vector<std::string> cameras = test::three_hosts()[i].cameras;
+    for (const std::string& id : cameras) {
       std::size_t files = 0;
       for (const auto& entry : fs::directory_iterator(parts_[i] / id)) {
         const fs::path copy = out_ / id / entry.path().filename();

@@ -9,8 +9,8 @@
 
 namespace emberlock::session {
 
-/// Writes into a finished session's manifest what is known of the other hosts' parts. Errors: refused (another
-/// process, or another thread, writes the session now), bad_input (no session), io.
+/// Writes into a finished session's manifest what is known of the other hosts' parts. Errors: refused
+/// (another process, or another thread, writes the session now), bad_input (no session), io.
 Status write_host_parts(const std::filesystem::path& folder, const std::vector<v1::HostPart>& parts);
 
 }  // namespace emberlock::session

@@ -226,7 +226,8 @@ void Conductor::watch_load(TimePoint now) {
   for (const MachineEvent& event : overload_.look(work, now)) static_cast<void>(happen(event));
 }
 
-/// The flame burns while nothing is aligned, here or by who leads, so that cameras can be exposed for it, and in recordings of it.
+/// The flame burns while nothing is aligned, here or by who leads, so that cameras can be exposed for it, and
+/// in recordings of it.
 void Conductor::set_scene() {
   const bool records = state_.phase == v1::CAPTURING || state_.phase == v1::FINISHING;
   const bool idle = state_.phase == v1::IDLE && parts_.loan.leader(SteadyClock().now()).empty();

@@ -114,7 +114,8 @@ class Conductor {
   /// Of this host's recording: what it is of, whose it is, the evidence of the lock.
   [[nodiscard]] v1::Manifest describe_take() const;
   [[nodiscard]] std::optional<v1::DecisionEvent> lock_evidence() const;
-  /// What each other host is asked for: leaves in the manifest this host's cameras, and names the others' parts.
+  /// What each other host is asked for: leaves in the manifest this host's cameras, and names the others'
+  /// parts.
   [[nodiscard]] std::vector<v1::PartRequest> part_requests(
       v1::Manifest& manifest, const std::optional<v1::DecisionEvent>& lock) const;
   void watch_hosts();
@@ -189,8 +190,8 @@ class Conductor {
   v1::RecordRequest record_request_;
   std::optional<v1::PartRequest> part_;  ///< the recording is for another host
   std::optional<TimePoint> part_ends_;   ///< as that one said
-  bool lit_for_recording_ = false;  ///< the strobe flashes for the recording alone
-  Status begun_;                    ///< how the recording asked for last began
+  bool lit_for_recording_ = false;       ///< the strobe flashes for the recording alone
+  Status begun_;                         ///< how the recording asked for last began
   std::filesystem::path record_folder_;
   std::optional<v1::RecordingStatus> recording_;  ///< the last that ended
   TimePoint record_began_;

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Several hosts as one rig: what this one does for a host that leads it, and what it asks of those that it leads.
+// Several hosts as one rig: what this one does for a host that leads it, and what it asks of those that it
+// leads.
 #include <algorithm>
 #include <limits>
 #include <utility>
@@ -72,7 +73,8 @@ Result<v1::HostPart> finished_part(const std::filesystem::path& folder, const v1
   if (session.ok()) part.set_until_ns(reached(*session));
   const bool salvaged = manifest.state() == v1::Manifest::SALVAGED;
   part.set_state(salvaged || !session.ok() ? v1::HostPart::SHORT : v1::HostPart::WHOLE);
-  if (salvaged) part.set_why("its emberlockd ended in the midst of it; what had reached the disk was salvaged");
+  if (salvaged)
+    part.set_why("its emberlockd ended in the midst of it; what had reached the disk was salvaged");
   if (!session.ok()) part.set_why(session.error().message());
   return part;
 }
@@ -90,8 +92,9 @@ v1::DecisionEvent part_of(const v1::DecisionEvent& lock, std::size_t first, std:
 Status Conductor::check_not_lent() const {
   const std::string leader = parts_.loan.leader(SteadyClock().now());
   if (leader.empty()) return {};
-  return Error{ErrorKind::refused, "its cameras are lent to " + leader, "emberlockd",
-               "Align and record there; five seconds after that emberlockd has ended they are this host's again"};
+  return Error{
+      ErrorKind::refused, "its cameras are lent to " + leader, "emberlockd",
+      "Align and record there; five seconds after that emberlockd has ended they are this host's again"};
 }
 
 Result<v1::LentCameras> Conductor::lend(const std::string& leader) {
@@ -140,7 +143,8 @@ Status Conductor::trim_lent(const v1::TrimRequest& request) {
 Result<v1::HostPart> Conductor::record_part(const v1::PartRequest& request) {
   EMBERLOCK_RETURN_IF_ERROR(parts_.loan.take(request.leader(), SteadyClock().now()));
   // Its answer may have been lost.
-  const bool runs = records_for_another() && part_->manifest().session_id() == request.manifest().session_id();
+  const bool runs =
+      records_for_another() && part_->manifest().session_id() == request.manifest().session_id();
   if (!runs) {
     EMBERLOCK_RETURN_IF_ERROR(session::check_text("purpose", request.manifest().purpose()));
     EMBERLOCK_ASSIGN_OR_RETURN(const std::filesystem::path folder,
@@ -178,7 +182,8 @@ Result<v1::HostPart> Conductor::part(const v1::FindPartRequest& request) {
     part.set_frames(recorder_->status(parts_.rig.clock().now()).frames());
     return part;
   }
-  const Error none{ErrorKind::out_of_data, "it has no part of this session", request.name(), "Look for it there"};
+  const Error none{ErrorKind::out_of_data, "it has no part of this session", request.name(),
+                   "Look for it there"};
   const auto folder = parts_.store.path_of(request.name());
   if (!folder.ok()) return none;
   const auto manifest = session::read_manifest(*folder);

@@ -53,7 +53,8 @@ Status Conductor::record(const v1::RecordRequest& request) {
                  "emberlockd begins a replay anew"};
   if (request.has_live()) EMBERLOCK_RETURN_IF_ERROR(check_live(request.live()));
   if (request.reconstruct() && parts_.hosts.any())
-    return Error{ErrorKind::refused, "its parts will lie on several hosts, so it can't be handed on", "reconstruct",
+    return Error{ErrorKind::refused, "its parts will lie on several hosts, so it can't be handed on",
+                 "reconstruct",
                  "Record without it, join the parts by `emberlock sessions join`, and reconstruct that"};
   return begin_take(request, folder);
 }

@@ -6,7 +6,8 @@
 namespace emberlock::daemon {
 
 Result<v1::LentCameras> Engine::lend(const std::string& leader) {
-  return on_thread<Result<v1::LentCameras>>(Urgency::waits, [leader](Conductor& c) { return c.lend(leader); });
+  return on_thread<Result<v1::LentCameras>>(Urgency::waits,
+                                            [leader](Conductor& c) { return c.lend(leader); });
 }
 
 void Engine::hear(const std::string& leader) { loan_.hear(leader, SteadyClock().now()); }

@@ -112,9 +112,9 @@ struct HostPartIs {
   v1::HostPart part;
 };
 
-using Reason =
-    std::variant<Why, Error, RecordingOf, ReconstructionOf, AlignmentSays, TimeOver, NoFrames, DiskRefused,
-                 Outcome, ClockMoved, RoomLeft, Overload, ReconstructionDone, ReconstructionFailed, HostPartIs>;
+using Reason = std::variant<Why, Error, RecordingOf, ReconstructionOf, AlignmentSays, TimeOver, NoFrames,
+                            DiskRefused, Outcome, ClockMoved, RoomLeft, Overload, ReconstructionDone,
+                            ReconstructionFailed, HostPartIs>;
 
 /// Who a fault concerns: by these it is raised once, and mended.
 struct FaultKey {

@@ -331,7 +331,8 @@ std::string remedy(v1::Fault::Kind kind, const Reason& reason) {
       const auto* is = std::get_if<HostPartIs>(&reason);
       return is != nullptr && is->part.state() == v1::HostPart::SHORT
                  ? "What was recorded there is kept: see to that host before the next take"
-                 : "See to that host and to the network: it records on by itself, and is asked until its part is "
+                 : "See to that host and to the network: it records on by itself, and is asked until its "
+                   "part is "
                    "known";
     }
     case v1::Fault::NOTHING_RECORDED:

@@ -33,8 +33,7 @@ void read_clock(const RemoteHost& host, v1::HostPart& part) {
 
 }  // namespace
 
-HostParts::HostParts(Hosts hosts, std::string leader)
-    : hosts_(std::move(hosts)), leader_(std::move(leader)) {
+HostParts::HostParts(Hosts hosts, std::string leader) : hosts_(std::move(hosts)), leader_(std::move(leader)) {
   if (any()) thread_ = std::thread([this] { run(); });
 }
 
@@ -141,8 +140,8 @@ void HostParts::take_up(const std::vector<std::filesystem::path>& folders) {
         if (host->address() == known.host()) part.host = host;
       take.parts.push_back(std::move(part));
     }
-    const bool all_settled = std::all_of(take.parts.begin(), take.parts.end(),
-                                         [](const Part& part) { return part.settled; });
+    const bool all_settled =
+        std::all_of(take.parts.begin(), take.parts.end(), [](const Part& part) { return part.settled; });
     if (!all_settled) takes_.push_back(std::move(take));
   }
 }

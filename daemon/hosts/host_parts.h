@@ -42,15 +42,15 @@ class HostParts {
   /// Each host's status, with how many parts are asked of it.
   [[nodiscard]] std::vector<v1::HostStatus> hosts() const;
 
-  /// Begins the parts of a session, all hosts at once, and waits for their answers: RemoteHost::kPatience at most.
-  /// A request is for the host that its place says. A host that doesn't answer begins when it does, as long as
-  /// the recording lasts. `folder` is this host's own part. Returns all parts.
+  /// Begins the parts of a session, all hosts at once, and waits for their answers: RemoteHost::kPatience at
+  /// most. A request is for the host that its place says. A host that doesn't answer begins when it does, as
+  /// long as the recording lasts. `folder` is this host's own part. Returns all parts.
   std::vector<v1::HostPart> begin(const std::filesystem::path& folder,
                                   const std::vector<v1::PartRequest>& requests);
   /// The recording ends, or ended, at this instant of this host's clock.
   void end(const std::filesystem::path& folder, TimePoint at);
-  /// This host's own part is finished: waits until the others are known, at most `patience`, and writes into the
-  /// manifest what is known of them; what comes later is written when it comes.
+  /// This host's own part is finished: waits until the others are known, at most `patience`, and writes into
+  /// the manifest what is known of them; what comes later is written when it comes.
   Status close(const std::filesystem::path& folder, Seconds patience);
   /// Takes up sessions of an earlier emberlockd, whose manifests name parts that aren't known to be whole.
   void take_up(const std::vector<std::filesystem::path>& folders);

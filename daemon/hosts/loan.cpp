@@ -39,13 +39,13 @@ Result<std::optional<v1::LentFrame>> LentFrames::next(Seconds wait) {
 }
 
 Status Loan::take(const std::string& leader, TimePoint now) {
-  if (leader.empty())
-    return Error{ErrorKind::bad_input, "the leader has no name", "leader", "Say who leads"};
+  if (leader.empty()) return Error{ErrorKind::bad_input, "the leader has no name", "leader", "Say who leads"};
   const std::lock_guard lock(mutex_);
   if (!leader_.empty() && leader_ != leader && !lapsed(now))
-    return Error{ErrorKind::refused, "its cameras are lent to " + leader_, "emberlockd",
-                 "End that one, or wait until it lets go of them: five seconds after it ended, or when what it "
-                 "records has ended"};
+    return Error{
+        ErrorKind::refused, "its cameras are lent to " + leader_, "emberlockd",
+        "End that one, or wait until it lets go of them: five seconds after it ended, or when what it "
+        "records has ended"};
   leader_ = leader;
   heard_ = now;
   return {};

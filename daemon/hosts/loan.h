@@ -40,8 +40,8 @@ class LentFrames {
   std::optional<Error> ended_;
 };
 
-/// Which leader has this host's cameras, and what it watches. A loan lapses when nothing was heard of its leader
-/// for kPatience, but not while something is recorded for it. Thread-safe.
+/// Which leader has this host's cameras, and what it watches. A loan lapses when nothing was heard of its
+/// leader for kPatience, but not while something is recorded for it. Thread-safe.
 class Loan {
  public:
   static constexpr Seconds kPatience{5};

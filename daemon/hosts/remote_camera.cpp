@@ -34,8 +34,9 @@ Status RemoteCamera::start() {
   // What doesn't answer the clock's questions would take this thread's time.
   if (!host_->connected()) return away();
   EMBERLOCK_ASSIGN_OR_RETURN(const v1::LentCameras lent, host_->borrow());
-  const auto found = std::find_if(lent.cameras().begin(), lent.cameras().end(),
-                                  [&](const auto& camera) { return camera.stream().camera_id() == info_.id; });
+  const auto found = std::find_if(lent.cameras().begin(), lent.cameras().end(), [&](const auto& camera) {
+    return camera.stream().camera_id() == info_.id;
+  });
   if (found == lent.cameras().end())
     return Error{ErrorKind::device, "it has no such camera", "camera " + info_.id + " at " + host_->address(),
                  "Name one that `emberlock status` lists there"};

@@ -18,8 +18,8 @@
 namespace emberlock::daemon {
 
 /// Another host's camera. Its frames come with stamps on this host's clock; the host sends fewer while it
-/// records them (hosts.proto), and those that it didn't send count as passed over. Losses are the camera's own.
-/// A reset is ordered at once, and must arrive before its instant: use it on a CameraThread with
+/// records them (hosts.proto), and those that it didn't send count as passed over. Losses are the camera's
+/// own. A reset is ordered at once, and must arrive before its instant: use it on a CameraThread with
 /// `reset_ahead`.
 class RemoteCamera final : public drivers::Camera {
  public:

@@ -20,9 +20,8 @@ constexpr int kSoonestMs = 250;
 constexpr int kLatestMs = 1000;
 
 std::chrono::system_clock::time_point in(Seconds time) {
-  return std::chrono::system_clock::now() +
-         std::chrono::duration_cast<std::chrono::system_clock::duration>(
-             std::chrono::duration<double>(time.value()));
+  return std::chrono::system_clock::now() + std::chrono::duration_cast<std::chrono::system_clock::duration>(
+                                                std::chrono::duration<double>(time.value()));
 }
 
 /// Beside the host's name.
@@ -33,9 +32,9 @@ std::string said(Error error) {
 
 }  // namespace
 
-Result<std::shared_ptr<grpc::Channel>> channel_to(const std::string& address,
-                                                  const rig::HostsConfig& hosts) {
-  EMBERLOCK_ASSIGN_OR_RETURN(const rig::TlsIdentity own, rig::TlsIdentity::read(hosts.certificate, hosts.key));
+Result<std::shared_ptr<grpc::Channel>> channel_to(const std::string& address, const rig::HostsConfig& hosts) {
+  EMBERLOCK_ASSIGN_OR_RETURN(const rig::TlsIdentity own,
+                             rig::TlsIdentity::read(hosts.certificate, hosts.key));
   constexpr std::size_t kLargestPem = 1 << 20;
   EMBERLOCK_ASSIGN_OR_RETURN(const std::string authority, read_file(hosts.authority, kLargestPem));
   grpc::SslCredentialsOptions ssl;
@@ -72,19 +71,20 @@ RemoteHost::~RemoteHost() {
 }
 
 Error RemoteHost::error_of(const grpc::Status& status) const {
-  const bool reached = !status.error_message().empty() &&
-                       (status.error_code() == grpc::StatusCode::INVALID_ARGUMENT ||
-                        status.error_code() == grpc::StatusCode::FAILED_PRECONDITION ||
-                        status.error_code() == grpc::StatusCode::INTERNAL ||
-                        status.error_code() == grpc::StatusCode::NOT_FOUND);
+  const bool reached =
+      !status.error_message().empty() && (status.error_code() == grpc::StatusCode::INVALID_ARGUMENT ||
+                                          status.error_code() == grpc::StatusCode::FAILED_PRECONDITION ||
+                                          status.error_code() == grpc::StatusCode::INTERNAL ||
+                                          status.error_code() == grpc::StatusCode::NOT_FOUND);
   const std::string where = "host " + address_;
   if (reached) {
     const bool refused = status.error_code() == grpc::StatusCode::FAILED_PRECONDITION;
     return {refused ? ErrorKind::refused : ErrorKind::device, status.error_message(), where, ""};
   }
-  return {ErrorKind::device, "it doesn't answer (" + status.error_message() + ")", where,
-          "See to its emberlockd, to the network between, and to the certificates of both; it is asked again by "
-          "itself"};
+  return {
+      ErrorKind::device, "it doesn't answer (" + status.error_message() + ")", where,
+      "See to its emberlockd, to the network between, and to the certificates of both; it is asked again by "
+      "itself"};
 }
 
 template <class Request, class Answer>

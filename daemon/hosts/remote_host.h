@@ -24,9 +24,10 @@ namespace emberlock::daemon {
 /// used, and again after a network was cut off. Errors: those of the files in [hosts].
 Result<std::shared_ptr<grpc::Channel>> channel_to(const std::string& address, const rig::HostsConfig& hosts);
 
-/// Another host, from the side of the leading one: what is asked of it, and how its clock stands. A thread asks
-/// for the clock four times a second, so it knows too whether the host answers. Any thread may call; no call
-/// takes longer than kPatience, or its own bound. Errors: device (it doesn't answer), else what the host says.
+/// Another host, from the side of the leading one: what is asked of it, and how its clock stands. A thread
+/// asks for the clock four times a second, so it knows too whether the host answers. Any thread may call; no
+/// call takes longer than kPatience, or its own bound. Errors: device (it doesn't answer), else what the host
+/// says.
 class RemoteHost {
  public:
   static constexpr Seconds kPatience = milliseconds(1500);
@@ -81,7 +82,7 @@ class RemoteHost {
   bool ending_ = false;
   ClockOffset offset_;
   Status answer_{Error{ErrorKind::device, "it wasn't reached yet"}};  ///< to the newest question
-  std::thread thread_;                                                 ///< last: it uses all of the above
+  std::thread thread_;                                                ///< last: it uses all of the above
 };
 
 }  // namespace emberlock::daemon

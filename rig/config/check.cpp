@@ -62,7 +62,8 @@ void check_camera(const ConfigCheck& t, const CameraConfig& camera, const std::s
   }
   // A session knows cameras by their ids alone.
   const bool twice = std::any_of(ids.begin(), ids.end(), [&](const auto& other) {
-    return other.second == camera.id && (other.first == camera.source || remote || other.first == CameraSource::remote);
+    return other.second == camera.id &&
+           (other.first == camera.source || remote || other.first == CameraSource::remote);
   });
   if (twice && remote) {
     t.problem(place(t.root, path + ".id"), "two cameras have the id \"" + camera.id + "\"",

@@ -226,25 +226,26 @@ Section<DaemonConfig> make_server_section() {
 
 Section<DaemonConfig> make_hosts_section() {
   using C = DaemonConfig;
-  return {"hosts",
-          "Cameras of several hosts as one rig: one emberlockd a host, one of which leads and has the others' "
-          "cameras in its rig, by driver \"remote\". Hosts show each other certificates.",
-          {text<C>("listen", EMBERLOCK_AT(hosts.listen), kAddress,
-                   "Address at which a leading host may borrow this one's cameras, all of them. Off if empty.",
-                   "\"0.0.0.0:7143\""),
-           text<C>("certificate", EMBERLOCK_AT(hosts.certificate), kPath,
-                   "This host's certificate: PEM, with its chain. Its subjectAltName is the name or address "
-                   "by which the leading host calls it.",
-                   "\"host.crt\""),
-           text<C>("key", EMBERLOCK_AT(hosts.key), kPath,
-                   "Private key of certificate: PEM. Other users must not be able to read it, its group must "
-                   "not be able to write to it.",
-                   "\"host.key\""),
-           text<C>("authority", EMBERLOCK_AT(hosts.authority), kPath,
-                   "PEM of the authority that signs the hosts' certificates.", "\"hosts.crt\""),
-           number<C>("alone_s", EMBERLOCK_AT(hosts.alone), {1, 86400},
-                     "How long a recording that this host leads goes on at another one that hears nothing "
-                     "from this one any more.")}};
+  return {
+      "hosts",
+      "Cameras of several hosts as one rig: one emberlockd a host, one of which leads and has the others' "
+      "cameras in its rig, by driver \"remote\". Hosts show each other certificates.",
+      {text<C>("listen", EMBERLOCK_AT(hosts.listen), kAddress,
+               "Address at which a leading host may borrow this one's cameras, all of them. Off if empty.",
+               "\"0.0.0.0:7143\""),
+       text<C>("certificate", EMBERLOCK_AT(hosts.certificate), kPath,
+               "This host's certificate: PEM, with its chain. Its subjectAltName is the name or address "
+               "by which the leading host calls it.",
+               "\"host.crt\""),
+       text<C>("key", EMBERLOCK_AT(hosts.key), kPath,
+               "Private key of certificate: PEM. Other users must not be able to read it, its group must "
+               "not be able to write to it.",
+               "\"host.key\""),
+       text<C>("authority", EMBERLOCK_AT(hosts.authority), kPath,
+               "PEM of the authority that signs the hosts' certificates.", "\"hosts.crt\""),
+       number<C>("alone_s", EMBERLOCK_AT(hosts.alone), {1, 86400},
+                 "How long a recording that this host leads goes on at another one that hears nothing "
+                 "from this one any more.")}};
 }
 
 Section<DaemonConfig> make_log_section() {

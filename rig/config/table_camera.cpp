@@ -19,12 +19,9 @@ std::optional<ImageSize> parse_size(const std::string& text) {
 }
 std::string print_size(ImageSize size) { return fmt::format("{}x{}", size.width, size.height); }
 
-const std::vector<std::pair<std::string_view, CameraSource>> kSources{{"virtual", CameraSource::virtual_},
-                                                                      {"v4l2", CameraSource::v4l2},
-                                                                      {"aravis", CameraSource::aravis},
-                                                                      {"ptp", CameraSource::ptp},
-                                                                      {"replay", CameraSource::replay},
-                                                                      {"remote", CameraSource::remote}};
+const std::vector<std::pair<std::string_view, CameraSource>> kSources{
+    {"virtual", CameraSource::virtual_}, {"v4l2", CameraSource::v4l2},     {"aravis", CameraSource::aravis},
+    {"ptp", CameraSource::ptp},          {"replay", CameraSource::replay}, {"remote", CameraSource::remote}};
 
 /// Restricts a key to cameras of these drivers.
 Key<CameraConfig> of(std::vector<CameraSource> sources, Key<CameraConfig> key) {
@@ -86,7 +83,8 @@ Keys camera_keys() {
                 "is GigE Vision and USB3 Vision, \"ptp\" is a Canon with CHDK, \"replay\" is a recorded "
                 "camera, \"remote\" is another host's. Required."),
       text<C>("id", EMBERLOCK_AT(id), "letters, digits, space and . _ : -",
-              "The camera's id, as `emberlock devices` prints it, for \"remote\" on its host. For \"replay\": the id in the session; all "
+              "The camera's id, as `emberlock devices` prints it, for \"remote\" on its host. For "
+              "\"replay\": the id in the session; all "
               "cameras of the session if absent. For \"virtual\": a name, or with count > 1 the prefix of "
               "the names; \"virtual\" if absent.",
               "\"virtual\""),

@@ -38,8 +38,8 @@ struct RigOptions {
 /// The configured cameras and strobe. In real time every camera has its own thread (drivers/camera_thread.h);
 /// an absent camera counts as lost and is searched for. A rig whose cameras are all virtual and fast, or all
 /// recorded with the strobe, runs on its own clock and on the owner's thread only, and is deterministic.
-/// Cameras are in the order of the configuration, other hosts' behind this one's. One owner thread, except for state(), trouble() and
-/// counts().
+/// Cameras are in the order of the configuration, other hosts' behind this one's. One owner thread, except
+/// for state(), trouble() and counts().
 class Rig {
  public:
   enum class Pace {

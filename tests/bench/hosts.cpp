@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-// How well cameras of several hosts are in sync, against those of one: the same number of simulated cameras at one
-// emberlockd, and at one a host, each host in a network namespace of its own and with a clock of its own. Needs root.
-//   bench_hosts --bin build/release/bin [--hosts 3] [--cameras 6] [--runs 20] [--tolerance 20rows] [--size 320x240]
-// Each run starts all daemons anew, so that shutters stand anyhow, and aligns. Prints the worst pair of each, the means
-// with their standard errors, and the ratio; and how long an alignment takes.
+// How well cameras of several hosts are in sync, against those of one: the same number of simulated cameras
+// at one emberlockd, and at one a host, each host in a network namespace of its own and with a clock of its
+// own. Needs root.
+//   bench_hosts --bin build/release/bin [--hosts 3] [--cameras 6] [--runs 20] [--tolerance 20rows] [--size
+//   320x240]
+// Each run starts all daemons anew, so that shutters stand anyhow, and aligns. Prints the worst pair of each,
+// the means with their standard errors, and the ratio; and how long an alignment takes.
 #include <chrono>
 #include <cmath>
 #include <cstdio>
@@ -49,8 +51,8 @@ std::optional<Run> align_once(const Arguments& a, int hosts, const fs::path& fol
   const test::CertificateAuthority authority("who signs hosts");
   const test::LabHost::Programs programs{a.bin + "/emberlockd", a.bin + "/emberlock"};
   const auto make = [&](int number) {
-    return std::make_unique<test::LabHost>(
-        test::LabHost::Setup{folder, number, a.cameras / hosts, a.size}, network, authority, programs);
+    return std::make_unique<test::LabHost>(test::LabHost::Setup{folder, number, a.cameras / hosts, a.size},
+                                           network, authority, programs);
   };
   const auto leader = make(0);
   std::vector<std::unique_ptr<test::LabHost>> others;
@@ -126,9 +128,10 @@ int main(int argc, char** argv) {
   const Mean one = mean_of(all[0], worst);
   const Mean several = mean_of(all[1], worst);
   const double ratio = several.mean / one.mean;
-  std::printf("worst pair, mean: %.3f +- %.3f ms on 1 host, %.3f +- %.3f ms on %d: ratio %.3f +- %.3f\n", one.mean,
-              one.error, several.mean, several.error, a.hosts, ratio,
+  std::printf("worst pair, mean: %.3f +- %.3f ms on 1 host, %.3f +- %.3f ms on %d: ratio %.3f +- %.3f\n",
+              one.mean, one.error, several.mean, several.error, a.hosts, ratio,
               ratio * std::hypot(one.error / one.mean, several.error / several.mean));
-  std::printf("alignment takes: %.1f +- %.1f s on 1 host, %.1f +- %.1f s on %d\n", mean_of(all[0], takes).mean,
-              mean_of(all[0], takes).error, mean_of(all[1], takes).mean, mean_of(all[1], takes).error, a.hosts);
+  std::printf("alignment takes: %.1f +- %.1f s on 1 host, %.1f +- %.1f s on %d\n",
+              mean_of(all[0], takes).mean, mean_of(all[0], takes).error, mean_of(all[1], takes).mean,
+              mean_of(all[1], takes).error, a.hosts);
 }

@@ -5,8 +5,8 @@
 #include <cstdint>
 #include <cstdlib>
 
-/// Whatever another host sends for a frame: an error that says where and what to do, or a picture of the size that it
-/// claims, which goes on as it came.
+/// Whatever another host sends for a frame: an error that says where and what to do, or a picture of the size
+/// that it claims, which goes on as it came.
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   using namespace emberlock;
   v1::LentFrame lent;

@@ -53,7 +53,8 @@ class HostNetwork {
   void connect(int host) { in("hub", "ip link set port" + std::to_string(host) + " up"); }
   /// In a child process, before it runs a program.
   void enter(int host) const {
-    const UniqueFd file(::open(("/var/run/netns/" + name(std::to_string(host))).c_str(), O_RDONLY | O_CLOEXEC));
+    const UniqueFd file(
+        ::open(("/var/run/netns/" + name(std::to_string(host))).c_str(), O_RDONLY | O_CLOEXEC));
     if (!file || ::setns(file.get(), CLONE_NEWNET) != 0) ::_exit(126);
   }
 
@@ -151,7 +152,8 @@ class LabHost {
       std::this_thread::sleep_for(std::chrono::milliseconds(10));
   }
   [[nodiscard]] Shell client(const std::string& words) const {
-    return shell(programs_.emberlock + " " + words + " --daemon unix:" + (folder_ / "run" / "d.sock").string());
+    return shell(programs_.emberlock + " " + words +
+                 " --daemon unix:" + (folder_ / "run" / "d.sock").string());
   }
   /// Asks until the answer has `words`, for two minutes: the machine may be busy.
   [[nodiscard]] bool answers(const std::string& question, const std::string& words) const {

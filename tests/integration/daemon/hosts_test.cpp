@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-// Several hosts as one rig: an emberlockd each, in a network namespace of its own and with a clock of its own.
+// Several hosts as one rig: an emberlockd each, in a network namespace of its own and with a clock of its
+// own.
 #include <chrono>
-#include <functional>
 #include <filesystem>
+#include <functional>
 #include <memory>
 #include <string>
 #include <thread>

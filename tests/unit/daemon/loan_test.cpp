@@ -18,7 +18,8 @@ TimePoint at(double s) { return {static_cast<std::int64_t>(s * 1e9)}; }
 Frame frame(std::uint64_t id, double t, PixelFormat format = PixelFormat::gray8, int depth = 8) {
   auto image = std::make_shared<Image>(ImageLayout{{4, 2}, format, depth});
   for (std::size_t i = 0; i < image->bytes().size(); ++i) image->bytes()[i] = static_cast<std::byte>(i + id);
-  return {{.frame_id = id, .device_time = {7}, .system_time = {8}, .monotonic_time = at(t)}, std::move(image)};
+  return {{.frame_id = id, .device_time = {7}, .system_time = {8}, .monotonic_time = at(t)},
+          std::move(image)};
 }
 
 TEST(Loan, IsOneLeadersUntilNothingIsHeardOfItForAWhile) {
@@ -105,8 +106,14 @@ TEST(LentFrame, ComesAsItWent) {
   for (const auto& [format, depth] : {std::pair(PixelFormat::gray8, 8), std::pair(PixelFormat::rgb16, 12),
                                       std::pair(PixelFormat::bayer_rggb8, 8)}) {
     const Frame sent = frame(3, 2.5, format, depth);
-    const drivers::FrameCounts counts{.delivered = 4, .damaged = 1, .camera_gap = 2, .transport = 3,
-                                      .resend = 5, .underrun = 6, .queue = 7, .passed_over = 8};
+    const drivers::FrameCounts counts{.delivered = 4,
+                                      .damaged = 1,
+                                      .camera_gap = 2,
+                                      .transport = 3,
+                                      .resend = 5,
+                                      .underrun = 6,
+                                      .queue = 7,
+                                      .passed_over = 8};
     const v1::LentFrame lent = to_proto(sent, counts);
     const auto came = frame_of(lent, "camera");
     ASSERT_TRUE(came.ok()) << came.error().message();

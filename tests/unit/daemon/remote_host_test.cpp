@@ -28,10 +28,7 @@ using ::testing::HasSubstr;
 constexpr ImageLayout kLentLayout{{16, 8}, PixelFormat::gray8, 8};
 
 Frame lent_frame(std::uint64_t id) {
-  return {{.frame_id = id,
-           .device_time = {},
-           .system_time = {},
-           .monotonic_time = SteadyClock().now()},
+  return {{.frame_id = id, .device_time = {}, .system_time = {}, .monotonic_time = SteadyClock().now()},
           std::make_shared<Image>(kLentLayout)};
 }
 

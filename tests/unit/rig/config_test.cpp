@@ -70,7 +70,8 @@ TEST(Config, WhatTheFileLeavesToTheMachineIsFilledIn) {
 
 TEST(Config, WhatIsPrintedIsReadAgain) {
   std::string text = uncommented();
-  text = std::regex_replace(text, std::regex("\n(controls|host) = .*"), "");  // of others than simulated cameras
+  text =
+      std::regex_replace(text, std::regex("\n(controls|host) = .*"), "");  // of others than simulated cameras
   const ConfigReading once = read_config(text, "/etc/emberlock/emberlockd.toml");
   ASSERT_TRUE(once.problems.empty()) << once.problems.front().message();
   const std::string printed = print_config(once.config);
@@ -192,7 +193,8 @@ TEST(Config, AnotherHostsCameraNeedsItsHostItsIdAndCertificates) {
   EXPECT_EQ(config.rig.cameras[1].host, "lab-2:7143");
   EXPECT_EQ(config.hosts.alone, Seconds(600));
   EXPECT_TRUE(config.hosts.key.is_absolute());
-  EXPECT_THAT(problem(kOwnCamera + remote_camera("id = \"there\"\n") + hosts), HasSubstr("the camera has no host"));
+  EXPECT_THAT(problem(kOwnCamera + remote_camera("id = \"there\"\n") + hosts),
+              HasSubstr("the camera has no host"));
   EXPECT_THAT(problem(kOwnCamera + remote_camera("id = \"there\"\nhost = \"lab-2\"\n") + hosts),
               HasSubstr("\"lab-2\" is no address"));
   EXPECT_THAT(problem(kOwnCamera + remote_camera("host = \"lab-2:7143\"\n") + hosts),
@@ -207,8 +209,10 @@ TEST(Config, AnotherHostsCameraNeedsItsHostItsIdAndCertificates) {
 }
 
 TEST(Config, AHostLendsWithCertificatesAndLeadsNone) {
-  EXPECT_TRUE(parsed(kOwnCamera + "[hosts]\nlisten = \"0.0.0.0:7143\"\n" + kIdentity).hosts.listen.ends_with("7143"));
-  EXPECT_THAT(problem(kOwnCamera + "[hosts]\nlisten = \"0.0.0.0:7143\"\n"), HasSubstr("listen needs certificate"));
+  EXPECT_TRUE(
+      parsed(kOwnCamera + "[hosts]\nlisten = \"0.0.0.0:7143\"\n" + kIdentity).hosts.listen.ends_with("7143"));
+  EXPECT_THAT(problem(kOwnCamera + "[hosts]\nlisten = \"0.0.0.0:7143\"\n"),
+              HasSubstr("listen needs certificate"));
   EXPECT_THAT(problem(kOwnCamera + "[hosts]\nlisten = \"here\"\n" + kIdentity), HasSubstr("is no address"));
   EXPECT_THAT(problem(kOwnCamera + remote_camera("id = \"there\"\nhost = \"lab-2:7143\"\n") +
                       "[hosts]\nlisten = \"0.0.0.0:7143\"\n" + kIdentity),

@@ -230,6 +230,18 @@ double start_time(const std::vector<std::string>& stat_fields) {
   return 0;
 }
 
+/// Of a host that leads.
+void show_hosts(Exposition& out, const v1::DaemonStatus& status) {
+  if (status.hosts().empty()) return;
+  out.family("emberlock_host_connected", "gauge", "1 where the other host answers.");
+  for (const v1::HostStatus& host : status.hosts())
+    out.sample(host.connected() ? 1 : 0, {{"host", host.host()}});
+  out.family("emberlock_host_round_trip_seconds", "gauge", "Of a question, lately.");
+  for (const v1::HostStatus& host : status.hosts()) out.sample(host.round_trip_s(), {{"host", host.host()}});
+  out.family("emberlock_host_parts_wanting", "gauge", "Parts of recordings that aren't known to be whole.");
+  for (const v1::HostStatus& host : status.hosts()) out.sample(host.parts_wanting(), {{"host", host.host()}});
+}
+
 }  // namespace
 
 ProcessUsage process_usage() {
@@ -262,6 +274,7 @@ std::string metrics_text(const v1::DaemonStatus& status, const ProcessUsage& pro
   show_daemon(out, status);
   show_cameras(out, status);
   show_recording(out, status);
+  show_hosts(out, status);
   show_reconstruction(out, status);
   show_clients(out, clients);
   show_process(out, process);

@@ -73,6 +73,16 @@ class Hosts : public ::testing::Test {
       return true;
     });
   }
+  /// One that is given up, as a dot stayed hidden or the machine was busy, is asked for again, as an operator
+  /// would.
+  [[nodiscard]] bool aligns() const {
+    for (int attempt = 0; attempt < 3; ++attempt) {
+      const Shell align = leader_->client("align --tolerance 60rows");
+      if (align.status == 0) return true;
+      std::printf("%s\n", align.output.c_str());
+    }
+    return false;
+  }
   [[nodiscard]] v1::Manifest manifest(const test::LabHost& host, const std::string& session) const {
     const auto read = session::read_manifest(host.sessions() / session);
     EXPECT_TRUE(read.ok()) << (read.ok() ? "" : read.error().message());
@@ -88,8 +98,7 @@ class Hosts : public ::testing::Test {
 
 TEST_F(Hosts, TwoAreLockedByOneStrobeAndRecordOneSession) {
   ASSERT_NO_FATAL_FAILURE(begin(1));
-  const Shell align = leader_->client("align --tolerance 60rows");
-  ASSERT_EQ(align.status, 0) << align.output;
+  ASSERT_TRUE(aligns());
   EXPECT_THAT(others_[0]->client("align").output, HasSubstr("lent to dome at"));
   EXPECT_THAT(others_[0]->client("record mine --unlocked").output, HasSubstr("lent to dome at"));
   const Shell record = leader_->client("record take --seconds 2");
@@ -158,7 +167,7 @@ TEST_F(Hosts, OneThatIsKilledHasWhatItHadAndTheLeaderSaysSo) {
   EXPECT_THAT(part.why(), HasSubstr("salvaged"));
   EXPECT_GT(part.frames(), 24U);
   EXPECT_TRUE(all_film()) << "it is taken up again";
-  EXPECT_EQ(leader_->client("align --tolerance 60rows").status, 0);
+  EXPECT_TRUE(aligns());
 }
 
 TEST_F(Hosts, ALeaderThatIsKilledFindsThePartsWhenItIsBack) {

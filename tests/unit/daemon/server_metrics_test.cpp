@@ -84,6 +84,11 @@ v1::DaemonStatus busy() {
   status.mutable_recording()->mutable_lost()->set_queue(4);
   status.mutable_storage()->set_minutes_left(2.5);
   status.mutable_reconstruction()->add_iterations();
+  v1::HostStatus& host = *status.add_hosts();
+  host.set_host("lab-2:7143");
+  host.set_connected(true);
+  host.set_round_trip_s(0.0005);
+  host.set_parts_wanting(2);
   return status;
 }
 
@@ -114,6 +119,9 @@ TEST(ServerMetrics, EverySampleIsTheStatusValue) {
       {R"(emberlock_recording_counts{fate="queue"})", 4},
       {"emberlock_storage_time_left_seconds", 150},
       {"emberlock_reconstruction_iterations", 1},
+      {R"(emberlock_host_connected{host="lab-2:7143"})", 1},
+      {R"(emberlock_host_round_trip_seconds{host="lab-2:7143"})", 0.0005},
+      {R"(emberlock_host_parts_wanting{host="lab-2:7143"})", 2},
       {R"(emberlock_watchers{by="console"})", 3},
       {R"(emberlock_watchers{by="grpc"})", 2},
       {R"(emberlock_refused_total{by="http",reason="wrong_token"})", 7},

@@ -114,12 +114,19 @@ class Conductor {
   /// Of this host's recording: what it is of, whose it is, the evidence of the lock.
   [[nodiscard]] v1::Manifest describe_take() const;
   [[nodiscard]] std::optional<v1::DecisionEvent> lock_evidence() const;
+  [[nodiscard]] std::optional<v1::DecisionEvent> lock_of_part() const;
   /// What each other host is asked for: leaves in the manifest this host's cameras, and names the others'
   /// parts.
   [[nodiscard]] std::vector<v1::PartRequest> part_requests(
       v1::Manifest& manifest, const std::optional<v1::DecisionEvent>& lock) const;
   void watch_hosts();
   [[nodiscard]] Status check_not_lent() const;
+  /// The cameras are the leader's from now on, if they are free or its own.
+  Status take_loan(const std::string& leader);
+  /// Another host's name for a session may be taken here.
+  [[nodiscard]] Result<std::filesystem::path> path_for_part(const std::string& name) const;
+  /// A part that is being recorded.
+  [[nodiscard]] v1::HostPart running_part() const;
   [[nodiscard]] bool records_for_another() const { return part_ && recorder_; }
   void describe_hosts(v1::DaemonStatus& status) const;
   void begin_finishing();
@@ -190,6 +197,7 @@ class Conductor {
   v1::RecordRequest record_request_;
   std::optional<v1::PartRequest> part_;  ///< the recording is for another host
   std::optional<TimePoint> part_ends_;   ///< as that one said
+  TimePoint part_heard_;                 ///< when that one last spoke of it
   bool lit_for_recording_ = false;       ///< the strobe flashes for the recording alone
   Status begun_;                         ///< how the recording asked for last began
   std::filesystem::path record_folder_;

@@ -2,6 +2,7 @@
 // Several hosts as one rig: what this one does for a host that leads it, and what it asks of those that it
 // leads.
 #include <algorithm>
+#include <cmath>
 #include <limits>
 #include <utility>
 
@@ -31,6 +32,15 @@ void describe_stagger(const rig::Alignment& alignment, v1::Manifest& manifest) {
       stream.set_late_s(camera.offset.value());
       stream.set_late_sigma_s(options.tolerance.in_time(options.row_time).value());
     }
+}
+
+void set_timing(v1::AlignmentSettings::Camera& told, const smear::CcdTiming& timing) {
+  told.set_rows(static_cast<std::uint32_t>(timing.rows));
+  told.set_shifts(static_cast<std::uint32_t>(timing.shifts));
+  told.set_row_time_s(timing.row_time.value());
+  told.set_direction(timing.direction == smear::ReadDirection::bottom_first
+                         ? v1::AlignmentSettings::BOTTOM_FIRST
+                         : v1::AlignmentSettings::TOP_FIRST);
 }
 
 /// What the leader knows of the cameras, and what the session is.
@@ -79,6 +89,28 @@ Result<v1::HostPart> finished_part(const std::filesystem::path& folder, const v1
   return part;
 }
 
+/// Clocks that are known to milliseconds, orders that are meant for now.
+Status check_instant(const char* field, std::int64_t ns) {
+  const double off = 1e-9 * (static_cast<double>(ns) - static_cast<double>(SteadyClock().now().ns));
+  constexpr double kFurthest = 10;
+  if (std::abs(off) <= kFurthest) return {};
+  return Error{ErrorKind::bad_input, fmt::format("is {:.0f} s from now", off), field,
+               "Give an instant of this host's monotonic clock"};
+}
+
+Status check_part(const v1::PartRequest& request) {
+  EMBERLOCK_RETURN_IF_ERROR(check_instant("from_ns", request.from_ns()));
+  EMBERLOCK_RETURN_IF_ERROR(session::check_text("purpose", request.manifest().purpose()));
+  EMBERLOCK_RETURN_IF_ERROR(session::check_text("session_id", request.manifest().session_id()));
+  EMBERLOCK_RETURN_IF_ERROR(session::check_text("led_by", request.manifest().led_by()));
+  constexpr double kLongest = 1e6;
+  if (!(request.seconds() >= 0 && request.seconds() <= kLongest))
+    return Error{ErrorKind::bad_input, "is no length of time", "seconds", "Give 0 to 1000000"};
+  if (!(request.alone_s() >= 1 && request.alone_s() <= kLongest))
+    return Error{ErrorKind::bad_input, "is no length of time", "alone_s", "Give 1 to 1000000"};
+  return {};
+}
+
 }  // namespace
 
 v1::DecisionEvent part_of(const v1::DecisionEvent& lock, std::size_t first, std::size_t count) {
@@ -97,22 +129,28 @@ Status Conductor::check_not_lent() const {
       "Align and record there; five seconds after that emberlockd has ended they are this host's again"};
 }
 
-Result<v1::LentCameras> Conductor::lend(const std::string& leader) {
+Status Conductor::take_loan(const std::string& leader) {
   const TimePoint now = SteadyClock().now();
-  const bool own_use = parts_.loan.leader(now).empty() && state_.phase != v1::IDLE;
-  if (own_use)
+  const std::string before = parts_.loan.leader(now);
+  if (before.empty() && state_.phase != v1::IDLE)
     return Error{ErrorKind::refused, "it uses its cameras itself", "emberlockd",
                  "End its alignment and its recording there first"};
-  const bool new_one = parts_.loan.leader(now) != leader;
+  EMBERLOCK_RETURN_IF_ERROR(session::check_text("leader", leader));
   EMBERLOCK_RETURN_IF_ERROR(parts_.loan.take(leader, now));
-  if (new_one) {
-    parts_.board.notice(v1::GREEN, "The cameras are lent to " + leader);
-    set_scene();
-  }
+  if (before == leader) return {};
+  parts_.board.notice(v1::GREEN, "The cameras are lent to " + leader);
+  set_scene();
+  return {};
+}
+
+Result<v1::LentCameras> Conductor::lend(const std::string& leader) {
+  EMBERLOCK_RETURN_IF_ERROR(take_loan(leader));
   v1::LentCameras lent;
   const auto states = camera_states();
+  const std::vector<smear::CcdTiming> timing = parts_.rig.timing();
   for (std::size_t i = 0; i < states.size(); ++i) {
     v1::LentCameras::Camera& camera = *lent.add_cameras();
+    set_timing(*camera.mutable_timing(), timing[i]);
     *camera.mutable_stream() = drivers::to_proto(devices_.cameras[i]->info());
     camera.set_state(states[i]);
   }
@@ -120,7 +158,7 @@ Result<v1::LentCameras> Conductor::lend(const std::string& leader) {
 }
 
 Result<std::size_t> Conductor::lent_camera(const std::string& leader, const std::string& camera_id) {
-  EMBERLOCK_RETURN_IF_ERROR(parts_.loan.take(leader, SteadyClock().now()));
+  EMBERLOCK_RETURN_IF_ERROR(take_loan(leader));
   for (std::size_t i = 0; i < devices_.cameras.size(); ++i) {
     if (devices_.cameras[i]->info().id != camera_id) continue;
     if (parts_.rig.state(i) == drivers::CameraThread::State::filming) return i;
@@ -131,56 +169,70 @@ Result<std::size_t> Conductor::lent_camera(const std::string& leader, const std:
 }
 
 Status Conductor::reset_lent(const v1::ResetRequest& request) {
+  EMBERLOCK_RETURN_IF_ERROR(check_instant("at_ns", request.at_ns()));
   EMBERLOCK_ASSIGN_OR_RETURN(const std::size_t camera, lent_camera(request.leader(), request.camera_id()));
   return devices_.cameras[camera]->reset_shutter({request.at_ns()});
 }
 
 Status Conductor::trim_lent(const v1::TrimRequest& request) {
+  if (!std::isfinite(request.trim_ppm()))
+    return Error{ErrorKind::bad_input, "is no number", "trim_ppm", "Give a finite one"};
   EMBERLOCK_ASSIGN_OR_RETURN(const std::size_t camera, lent_camera(request.leader(), request.camera_id()));
   return devices_.cameras[camera]->trim_rate(PartsPerMillion(request.trim_ppm()));
 }
 
-Result<v1::HostPart> Conductor::record_part(const v1::PartRequest& request) {
-  EMBERLOCK_RETURN_IF_ERROR(parts_.loan.take(request.leader(), SteadyClock().now()));
-  // Its answer may have been lost.
-  const bool runs =
-      records_for_another() && part_->manifest().session_id() == request.manifest().session_id();
-  if (!runs) {
-    EMBERLOCK_RETURN_IF_ERROR(session::check_text("purpose", request.manifest().purpose()));
-    EMBERLOCK_ASSIGN_OR_RETURN(const std::filesystem::path folder,
-                               parts_.store.path_for_new(request.name(), wall_clock()));
-    if (recorder_)
-      return Error{ErrorKind::refused, "a recording runs", "emberlockd", "Wait until it has ended"};
-    v1::RecordRequest take;
-    take.set_name(request.name());
-    take.set_purpose(request.manifest().purpose());
-    take.set_seconds(request.seconds());
-    take.set_unlocked(true);  // the leader knows of the lock
-    part_ = request;
-    EMBERLOCK_RETURN_IF_ERROR(begin_take(take, folder));
+Result<std::filesystem::path> Conductor::path_for_part(const std::string& name) const {
+  constexpr int kMostOfAName = 100;
+  auto path = parts_.store.path_for_new(name, wall_clock());
+  for (int i = 2; i < kMostOfAName && !path.ok() && parts_.store.path_of(name).ok(); ++i) {
+    path = parts_.store.path_for_new(fmt::format("{} {}", name, i), wall_clock());
   }
+  return path;
+}
+
+v1::HostPart Conductor::running_part() const {
   v1::HostPart part;
   part.set_session(record_folder_.filename().string());
   part.set_state(v1::HostPart::RECORDING);
+  for (std::size_t i = 0; i < parts_.rig.own(); ++i) part.add_camera_ids(devices_.cameras[i]->info().id);
+  part.set_frames(recorder_->status(parts_.rig.clock().now()).frames());
   return part;
 }
 
+Result<v1::HostPart> Conductor::record_part(const v1::PartRequest& request) {
+  EMBERLOCK_RETURN_IF_ERROR(check_part(request));
+  EMBERLOCK_RETURN_IF_ERROR(take_loan(request.leader()));
+  part_heard_ = SteadyClock().now();
+  // Its answer may have been lost.
+  if (records_for_another() && part_->manifest().session_id() == request.manifest().session_id())
+    return running_part();
+  if (recorder_)
+    return Error{ErrorKind::refused, "a recording runs", "emberlockd", "Wait until it has ended"};
+  EMBERLOCK_ASSIGN_OR_RETURN(const std::filesystem::path folder, path_for_part(request.name()));
+  v1::RecordRequest take;
+  take.set_name(request.name());
+  take.set_purpose(request.manifest().purpose());
+  take.set_seconds(request.seconds());
+  take.set_unlocked(true);  // the leader knows of the lock
+  part_ = request;
+  EMBERLOCK_RETURN_IF_ERROR(begin_take(take, folder));
+  return running_part();
+}
+
 Status Conductor::stop_part(const v1::StopPartRequest& request) {
-  EMBERLOCK_RETURN_IF_ERROR(parts_.loan.take(request.leader(), SteadyClock().now()));
+  EMBERLOCK_RETURN_IF_ERROR(take_loan(request.leader()));
   const bool runs = records_for_another() && part_->manifest().session_id() == request.session_id() &&
                     state_.phase == v1::CAPTURING;
   if (!runs) return {};
+  part_heard_ = SteadyClock().now();
   part_ends_ = TimePoint{request.at_ns()};
   return happen(AskStopRecording{});
 }
 
 Result<v1::HostPart> Conductor::part(const v1::FindPartRequest& request) {
   if (records_for_another() && part_->manifest().session_id() == request.session_id()) {
-    v1::HostPart part;
-    part.set_session(record_folder_.filename().string());
-    part.set_state(v1::HostPart::RECORDING);
-    part.set_frames(recorder_->status(parts_.rig.clock().now()).frames());
-    return part;
+    part_heard_ = SteadyClock().now();
+    return running_part();
   }
   const Error none{ErrorKind::out_of_data, "it has no part of this session", request.name(),
                    "Look for it there"};
@@ -206,8 +258,22 @@ v1::Manifest Conductor::describe_take() const {
   return manifest;
 }
 
+/// In the order of this host's cameras; nothing where the leader doesn't name all of them.
+std::optional<v1::DecisionEvent> Conductor::lock_of_part() const {
+  const v1::Manifest& told = part_->manifest();
+  if (!part_->has_lock() || part_->lock().cameras_size() != told.cameras_size()) return std::nullopt;
+  v1::DecisionEvent lock = part_->lock();
+  lock.clear_cameras();
+  for (std::size_t i = 0; i < parts_.rig.own(); ++i)
+    for (int c = 0; c < told.cameras_size(); ++c)
+      if (told.cameras(c).camera_id() == devices_.cameras[i]->info().id)
+        *lock.add_cameras() = part_->lock().cameras(c);
+  if (lock.cameras_size() != static_cast<int>(parts_.rig.own())) return std::nullopt;
+  return lock;
+}
+
 std::optional<v1::DecisionEvent> Conductor::lock_evidence() const {
-  if (part_) return part_->has_lock() ? std::optional(part_->lock()) : std::nullopt;
+  if (part_) return lock_of_part();
   if (!alignment_ || state_.lock != Lock::held) return std::nullopt;
   return rig::lock_evidence(*alignment_, parts_.rig.clock().now());
 }
@@ -222,6 +288,7 @@ std::vector<v1::PartRequest> Conductor::part_requests(v1::Manifest& manifest,
     part.set_host(host);
     part.set_session(state_.session);
     part.set_state(v1::HostPart::RECORDING);
+    if (const auto clock = parts_.hosts.clock(host)) *part.add_clock() = *clock;
     v1::Manifest& told = *request.mutable_manifest();
     told.set_session_id(manifest.session_id());
     told.set_created_utc(manifest.created_utc());

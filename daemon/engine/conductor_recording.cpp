@@ -127,7 +127,8 @@ void Conductor::begin_recording() {
   expired_ = false;
   counted_before_ = own_counts();
   parts_.loan.hold(part_.has_value());
-  if (!parts.empty()) static_cast<void>(parts_.hosts.begin(record_folder_, parts));
+  if (!parts.empty())
+    parts_.hosts.begin(record_folder_, parts, {manifest.hosts().begin(), manifest.hosts().end()});
   if (record_request_.has_live()) parts_.live.start(record_folder_, record_request_.live());
   static_cast<void>(happen(RecordingBegun{}));
 }
@@ -300,7 +301,7 @@ void Conductor::capture() {
     static_cast<void>(
         happen(FaultRaised{{v1::Fault::DISK_FAILED, state_.session}, v1::RED, DiskRefused{*failure}}));
     static_cast<void>(happen(RecordingEnds{DiskRefused{*failure}}));
-  } else if (part_ && parts_.loan.silence(SteadyClock().now()) > Seconds(part_->alone_s())) {
+  } else if (part_ && SteadyClock().now() - part_heard_ > Seconds(part_->alone_s())) {
     static_cast<void>(happen(RecordingEnds{Why::leader_gone}));
   } else if (seconds > 0 && now - record_began_ >= Seconds(seconds)) {
     static_cast<void>(happen(RecordingEnds{TimeOver{Seconds(seconds)}}));

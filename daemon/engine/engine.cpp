@@ -76,7 +76,7 @@ Result<std::unique_ptr<Engine>> Engine::start(const rig::DaemonConfig& config, B
     };
   }
   EMBERLOCK_ASSIGN_OR_RETURN(HostParts::Hosts hosts, hosts_of(config));
-  if (!hosts.empty()) rig_options.remote = remote_cameras(hosts);
+  if (!hosts.empty()) open_remotely(hosts, rig_options);
   EMBERLOCK_ASSIGN_OR_RETURN(std::unique_ptr<rig::Rig> rig,
                              rig::Rig::open(config.rig, std::move(rig_options)));
   for (std::size_t i = 0; i < rig->size(); ++i) ids->push_back(rig->camera(i).info().id);
@@ -215,9 +215,10 @@ bool Engine::alive() const {
     if (!tolerates_hanging(phase_, job.kind())) return false;
   if (rig_->pace() != rig::Rig::Pace::real_time) return true;
   const std::lock_guard lock(progress_mutex_);
-  progress_.resize(rig_->size());
+  progress_.resize(rig_->own());
   bool all = true;
-  for (std::size_t i = 0; i < rig_->size(); ++i) {
+  // Another host's cameras are its own watchdog's.
+  for (std::size_t i = 0; i < rig_->own(); ++i) {
     const std::uint64_t frames = rig_->counts(i).made();
     if (rig_->state(i) != drivers::CameraThread::State::filming || rig_->overworked(i) ||
         frames != progress_[i].frames || progress_[i].at == TimePoint{})

@@ -3,6 +3,9 @@
 
 #include <algorithm>
 #include <array>
+#include <cstdint>
+#include <memory>
+#include <optional>
 #include <utility>
 
 #include <unistd.h>
@@ -30,12 +33,29 @@ Result<HostParts::Hosts> hosts_of(const rig::DaemonConfig& config) {
   return hosts;
 }
 
-std::function<std::unique_ptr<drivers::Camera>(const rig::CameraConfig&, drivers::CameraInfo)> remote_cameras(
-    HostParts::Hosts hosts) {
-  return [hosts = std::move(hosts)](const rig::CameraConfig& camera, drivers::CameraInfo expected) {
-    const auto host = std::find_if(hosts.begin(), hosts.end(),
-                                   [&](const auto& one) { return one->address() == camera.host; });
-    return std::make_unique<RemoteCamera>(*host, std::move(expected));
+void open_remotely(const HostParts::Hosts& hosts, rig::RigOptions& options) {
+  const auto host_of = [hosts](const rig::CameraConfig& camera) {
+    return *std::find_if(hosts.begin(), hosts.end(),
+                         [&](const auto& one) { return one->address() == camera.host; });
+  };
+  options.remote = [host_of](const rig::CameraConfig& camera, drivers::CameraInfo expected) {
+    return std::make_unique<RemoteCamera>(host_of(camera), std::move(expected));
+  };
+  options.remote_timing = [host_of](const rig::CameraConfig& config) -> std::optional<smear::CcdTiming> {
+    const auto camera = host_of(config)->camera(config.id);
+    constexpr std::uint32_t kMost = 1 << 20;
+    if (!camera || camera->timing().rows() == 0 || camera->timing().rows() > kMost ||
+        camera->timing().shifts() > kMost || !(camera->timing().row_time_s() > 0))
+      return std::nullopt;
+    const v1::AlignmentSettings::Camera& told = camera->timing();
+    smear::CcdTiming timing;
+    timing.rows = static_cast<int>(told.rows());
+    timing.shifts = static_cast<int>(told.shifts());
+    timing.row_time = SecondsPerRow(told.row_time_s());
+    timing.direction = told.direction() == v1::AlignmentSettings::BOTTOM_FIRST
+                           ? smear::ReadDirection::bottom_first
+                           : smear::ReadDirection::top_first;
+    return timing;
   };
 }
 

@@ -1,14 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <functional>
-#include <memory>
 #include <string>
 
 #include "base/result.h"
 #include "daemon/hosts/host_parts.h"
-#include "drivers/camera.h"
 #include "rig/config/config.h"
+#include "rig/devices/rig.h"
 
 namespace emberlock::daemon {
 
@@ -19,8 +17,7 @@ std::string leader_name(const std::string& rig);
 /// Errors: those of the files in [hosts].
 Result<HostParts::Hosts> hosts_of(const rig::DaemonConfig& config);
 
-/// Opens the rig's cameras of other hosts (RigOptions::remote).
-std::function<std::unique_ptr<drivers::Camera>(const rig::CameraConfig&, drivers::CameraInfo)> remote_cameras(
-    HostParts::Hosts hosts);
+/// Has the rig open cameras of other hosts (RigOptions::remote, remote_timing).
+void open_remotely(const HostParts::Hosts& hosts, rig::RigOptions& options);
 
 }  // namespace emberlock::daemon

@@ -217,6 +217,7 @@ class Stepper {
       case v1::Fault::TRANSCODE_FAILED:
       case v1::Fault::SALVAGE_FAILED:
       case v1::Fault::NOTHING_RECORDED:
+      case v1::Fault::PART_WANTING:
       case v1::Fault::RECONSTRUCTION_FAILED:
       case v1::Fault::NOT_ALIGNED:
         return true;

@@ -7,7 +7,15 @@ namespace emberlock::daemon {
 
 void ClockOffset::add(TimePoint asked, TimePoint there, TimePoint heard) {
   if (heard < asked) return;
-  answers_.push_back({asked, heard, there.ns - (asked.ns + (heard.ns - asked.ns) / 2)});
+  const Answer answer{asked, heard, there.ns - (asked.ns + (heard.ns - asked.ns) / 2)};
+  // One of the machines may have been started anew: then both can't be true of one clock.
+  std::erase_if(answers_, [&](const Answer& before) {
+    const Seconds wrong = 0.5 * (before.heard - before.asked) + 0.5 * (heard - asked) +
+                          1e-6 * kDrift.value() * (heard - before.asked);
+    return std::abs(1e-9 * (static_cast<double>(answer.ahead_ns) - static_cast<double>(before.ahead_ns))) >
+           wrong.value() + 1e-6;
+  });
+  answers_.push_back(answer);
   if (answers_.size() > kKept) answers_.pop_front();
 }
 

@@ -21,7 +21,7 @@ class ClockOffset {
   static constexpr PartsPerMillion kDrift{100};  ///< of two clocks at most, one against the other
 
   /// A question asked and heard at these times of this clock, answered with the other clock's. One that was
-  /// heard before it was asked is left out.
+  /// heard before it was asked is left out; earlier ones that can't be true of the same clock are forgotten.
   void add(TimePoint asked, TimePoint there, TimePoint heard);
   /// What `at_ns` of this clock is on the other; nothing before the first answer.
   [[nodiscard]] std::optional<v1::ClockReading> reading(TimePoint at) const;

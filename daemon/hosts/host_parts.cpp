@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cmath>
 #include <utility>
 
 #include <fmt/format.h>
@@ -17,6 +18,7 @@ namespace {
 constexpr auto kBetweenLooks = std::chrono::milliseconds(250);
 /// A part that ends so much earlier than the recording is short.
 constexpr Seconds kShort = milliseconds(500);
+constexpr PartsPerMillion kMostDrift{1000};  ///< of two clocks, as session/host_clock.h has it
 
 bool is_wanting(const v1::HostPart& part) {
   return part.state() == v1::HostPart::MISSING || part.state() == v1::HostPart::SHORT;
@@ -27,8 +29,34 @@ void set(v1::HostPart& part, v1::HostPart::State state, std::string why) {
   part.set_why(std::move(why));
 }
 
+/// Adds what the host's clock shows now, if one clock can have shown that and what it showed before: either
+/// machine may have been started anew.
 void read_clock(const RemoteHost& host, v1::HostPart& part) {
-  if (const auto reading = host.clock(SteadyClock().now())) *part.add_clock() = *reading;
+  const auto now = host.clock(SteadyClock().now());
+  if (!now) return;
+  if (part.clock_size() > 0) {
+    const v1::ClockReading& before = part.clock(part.clock_size() - 1);
+    const auto since = static_cast<double>(now->at_ns()) - static_cast<double>(before.at_ns());
+    const double off = static_cast<double>(now->ahead_ns()) - static_cast<double>(before.ahead_ns());
+    const auto sigmas = static_cast<double>(now->sigma_ns() + before.sigma_ns());
+    if (since <= 0 || std::abs(off) > 1e-6 * kMostDrift.value() * since + sigmas) return;
+  }
+  *part.add_clock() = *now;
+}
+
+/// What the other host's clock showed, on this one's, by the newest reading.
+std::optional<TimePoint> here(const v1::HostPart& part, std::int64_t there_ns) {
+  if (part.clock_size() == 0 || there_ns == 0) return std::nullopt;
+  return TimePoint{there_ns - part.clock(part.clock_size() - 1).ahead_ns()};
+}
+
+/// As long as two of its cameras' frames last, at least.
+Seconds short_by(const std::optional<v1::PartRequest>& request) {
+  Seconds by = kShort;
+  if (!request) return by;
+  for (const v1::CameraStream& camera : request->manifest().cameras())
+    if (camera.frame_rate_hz() > 0) by = std::max(by, 2 * period(Hertz(camera.frame_rate_hz())));
+  return by;
 }
 
 }  // namespace
@@ -44,12 +72,19 @@ HostParts::~HostParts() {
   }
   wakes_.notify_all();
   if (thread_.joinable()) thread_.join();
+  for (std::thread& one : beginning_) one.join();
 }
 
 std::vector<std::string> HostParts::addresses() const {
   std::vector<std::string> all;
   for (const auto& host : hosts_) all.push_back(host->address());
   return all;
+}
+
+std::optional<v1::ClockReading> HostParts::clock(const std::string& address) const {
+  for (const auto& host : hosts_)
+    if (host->address() == address) return host->clock(SteadyClock().now());
+  return std::nullopt;
 }
 
 std::vector<v1::HostStatus> HostParts::hosts() const {
@@ -65,42 +100,42 @@ std::vector<v1::HostStatus> HostParts::hosts() const {
 }
 
 void HostParts::begin(Part& part, const std::filesystem::path& folder) {
+  // Without its clock it couldn't be said from when on.
+  if (!part.host->connected() || !part.host->clock(SteadyClock().now()))
+    return set(part.known, v1::HostPart::MISSING, part.host->trouble());
   v1::PartRequest request = *part.request;
-  const TimePoint from = std::max(TimePoint{request.from_ns()}, SteadyClock().now());
-  request.set_from_ns(part.host->there(from).ns);
+  const TimePoint from{request.from_ns()};
+  request.set_from_ns(part.host->there(std::max(from, SteadyClock().now())).ns);
   request.set_name(folder.filename().string());
   const auto begun = part.host->record(std::move(request));
   if (!begun.ok()) return set(part.known, v1::HostPart::MISSING, begun.error().what);
+  part.begun = true;
+  part.late = std::max(SteadyClock().now() - from, Seconds(0));
   part.known.set_session(begun->session());
-  part.late = from - TimePoint{part.request->from_ns()};
+  if (begun->camera_ids_size() > 0) *part.known.mutable_camera_ids() = begun->camera_ids();
   set(part.known, v1::HostPart::RECORDING, "");
   if (part.known.clock_size() == 0) read_clock(*part.host, part.known);
 }
 
-std::vector<v1::HostPart> HostParts::begin(const std::filesystem::path& folder,
-                                           const std::vector<v1::PartRequest>& requests) {
-  Take take{.folder = folder};
-  std::vector<std::thread> asking;
-  take.parts.resize(hosts_.size());
-  for (std::size_t i = 0; i < hosts_.size(); ++i) {
-    Part& part = take.parts[i];
-    part.host = hosts_[i];
-    part.request = requests[i];
-    part.known.set_host(hosts_[i]->address());
-    part.known.set_session(folder.filename().string());
-    for (const v1::CameraStream& camera : requests[i].manifest().cameras())
-      part.known.add_camera_ids(camera.camera_id());
-    take.session_id = requests[i].manifest().session_id();
-    asking.emplace_back([&part, &folder] { begin(part, folder); });
-  }
-  for (std::thread& one : asking) one.join();
-  std::vector<v1::HostPart> all;
-  for (const Part& part : take.parts) all.push_back(part.known);
+void HostParts::begin(const std::filesystem::path& folder, const std::vector<v1::PartRequest>& requests,
+                      const std::vector<v1::HostPart>& known) {
+  for (std::thread& one : beginning_) one.join();  // of a take that ended long ago
+  beginning_.clear();
   const std::lock_guard lock(mutex_);
-  takes_.push_back(std::move(take));
-  Take& kept = takes_.back();
-  for (std::size_t i = 0; i < kept.parts.size(); ++i) take_over(folder, i, kept.parts[i]);
-  return all;
+  // One of this name that was there before was taken away.
+  std::erase_if(takes_, [&](const Take& take) { return take.folder == folder; });
+  Take& take = takes_.emplace_back(Take{.folder = folder});
+  for (std::size_t i = 0; i < hosts_.size(); ++i) {
+    take.session_id = requests[i].manifest().session_id();
+    Part& part = take.parts.emplace_back(Part{.host = hosts_[i], .request = requests[i], .known = known[i]});
+    part.busy = true;
+    beginning_.emplace_back([this, part, folder, i, session = take.session_id]() mutable {
+      begin(part, folder);
+      const std::lock_guard inner(mutex_);
+      part.busy = false;
+      take_over(session, i, std::move(part));
+    });
+  }
 }
 
 void HostParts::end(const std::filesystem::path& folder, TimePoint at) {
@@ -123,7 +158,16 @@ Status HostParts::close(const std::filesystem::path& folder, Seconds patience) {
   Take* take = find(folder);
   if (take == nullptr) return {};
   take->closed = true;
-  return write(*take);
+  take->behind = true;
+  for (Part& part : take->parts)
+    if (!part.settled && part.known.state() == v1::HostPart::RECORDING)
+      set(part.known, v1::HostPart::MISSING, "it is still being finished there");
+  write_behind(lock);
+  take = find(folder);
+  return take == nullptr || !take->behind
+             ? Status{}
+             : Status(Error{ErrorKind::refused, "what is known of other hosts' parts isn't written yet",
+                            folder.string(), "It is tried again by itself"});
 }
 
 void HostParts::take_up(const std::vector<std::filesystem::path>& folders) {
@@ -135,7 +179,7 @@ void HostParts::take_up(const std::vector<std::filesystem::path>& folders) {
     for (const v1::HostPart& known : manifest->hosts()) {
       Part part{.host = nullptr, .request = std::nullopt, .known = known};
       part.settled = known.state() == v1::HostPart::WHOLE || known.state() == v1::HostPart::SHORT;
-      part.wanting = is_wanting(known);
+      part.begun = known.state() != v1::HostPart::RECORDING;
       for (const auto& host : hosts_)
         if (host->address() == known.host()) part.host = host;
       take.parts.push_back(std::move(part));
@@ -166,24 +210,34 @@ HostParts::Take* HostParts::find(const std::filesystem::path& folder) {
   return found == takes_.end() ? nullptr : &*found;
 }
 
-void HostParts::take_over(const std::filesystem::path& folder, std::size_t place, Part part) {
-  Take* take = find(folder);
-  if (take == nullptr) return;
+void HostParts::take_over(const std::string& session_id, std::size_t place, Part part) {
+  const auto take = std::find_if(takes_.begin(), takes_.end(),
+                                 [&](const Take& one) { return one.session_id == session_id; });
+  if (take == takes_.end()) return;
   Part& kept = take->parts[place];
   const bool wanting = is_wanting(part.known);
   const bool news = wanting != kept.wanting || (part.settled && !kept.settled);
-  if (news) news_.push_back({folder.filename().string(), part.known});
+  if (news) news_.push_back({take->folder.filename().string(), part.known});
   take->behind = take->behind || news;
   kept = std::move(part);
   kept.wanting = wanting;
 }
 
-Status HostParts::write(Take& take) {
-  std::vector<v1::HostPart> parts;
-  for (const Part& part : take.parts) parts.push_back(part.known);
-  EMBERLOCK_RETURN_IF_ERROR(session::write_host_parts(take.folder, parts));
-  take.behind = false;
-  return {};
+/// Without the lock while the disk works. What fails is tried again.
+void HostParts::write_behind(std::unique_lock<std::mutex>& lock) {
+  for (std::size_t t = 0; t < takes_.size(); ++t) {
+    if (!takes_[t].closed || !takes_[t].behind) continue;
+    const std::string session = takes_[t].session_id;
+    const std::filesystem::path folder = takes_[t].folder;
+    std::vector<v1::HostPart> parts;
+    for (const Part& part : takes_[t].parts) parts.push_back(part.known);
+    takes_[t].behind = false;
+    lock.unlock();
+    const bool written = session::write_host_parts(folder, parts).ok();
+    lock.lock();
+    for (Take& take : takes_)
+      if (take.session_id == session && !written) take.behind = true;
+  }
 }
 
 void HostParts::settle(const Take& take, const v1::HostPart& there, Part& part) {
@@ -192,45 +246,52 @@ void HostParts::settle(const Take& take, const v1::HostPart& there, Part& part) 
   part.known.set_frames(there.frames());
   part.known.set_lost(there.lost());
   part.known.set_until_ns(there.until_ns());
+  if (there.camera_ids_size() > 0) *part.known.mutable_camera_ids() = there.camera_ids();
   if (there.state() == v1::HostPart::SHORT) return set(part.known, v1::HostPart::SHORT, there.why());
-  if (take.restarted) return set(part.known, v1::HostPart::WHOLE, "");
-  if (!take.ended) return set(part.known, v1::HostPart::SHORT, "it ended before the recording did");
-  const Seconds early = *take.ended - part.host->here({there.until_ns()});
-  if (part.late > kShort)
+  if (there.until_ns() == 0) return set(part.known, v1::HostPart::SHORT, "one of its cameras has no frames");
+  const Seconds by = short_by(part.request);
+  if (part.late > by)
     return set(part.known, v1::HostPart::SHORT,
                fmt::format("its frames begin {:.1f} s after the recording does", part.late.value()));
-  if (early > kShort)
-    return set(part.known, v1::HostPart::SHORT,
-               fmt::format("its frames end {:.1f} s before the recording does", early.value()));
+  const auto until = here(part.known, there.until_ns());
+  if (take.ended && until && *take.ended - *until > by)
+    return set(
+        part.known, v1::HostPart::SHORT,
+        fmt::format("its frames end {:.1f} s before the recording does", (*take.ended - *until).value()));
   set(part.known, v1::HostPart::WHOLE, "");
 }
 
 HostParts::Part HostParts::asked(const Take& take, Part part) {
+  using State = v1::HostPart;
   if (part.host == nullptr) {
-    set(part.known, v1::HostPart::MISSING, "its host isn't one of the rig's any more, so it isn't asked");
+    set(part.known, State::MISSING, "its host isn't one of the rig's any more, so it isn't asked");
     return part;
   }
   if (!part.host->connected()) {
-    set(part.known, v1::HostPart::MISSING, part.host->trouble());
+    set(part.known, State::MISSING, part.host->trouble());
     return part;
   }
   const auto there = part.host->part(take.session_id, part.known.session());
   if (!there.ok()) {
-    set(part.known, v1::HostPart::MISSING, there.error().what);
-  } else if (!*there && !take.ended && part.request) {
+    set(part.known, State::MISSING, there.error().what);
+  } else if (!*there && !take.ended && part.request && !part.begun) {
     begin(part, take.folder);
+  } else if (!*there && part.begun) {
+    set(part.known, State::MISSING, "its host doesn't find it: is its disk mounted?");
   } else if (!*there) {
     part.settled = true;
-    set(part.known, v1::HostPart::SHORT, "nothing of it was recorded there");
-  } else if ((*there)->state() == v1::HostPart::RECORDING) {
-    set(part.known, v1::HostPart::RECORDING, "");
+    set(part.known, State::SHORT, "nothing of it was recorded there");
+  } else if ((*there)->state() == State::RECORDING) {
+    part.begun = true;
+    set(part.known, State::RECORDING, "");
+    part.known.set_session((*there)->session());
     part.known.set_frames((*there)->frames());
     if (take.ended || take.restarted)
       static_cast<void>(part.host->stop_part(take.session_id, part.known.session(),
                                              take.ended.value_or(SteadyClock().now())));
-  } else {
+  } else if (take.ended || take.restarted || (*there)->state() == State::SHORT) {
     settle(take, **there, part);
-  }
+  }  // else it ended by its own clock, a moment before this host's recording
   return part;
 }
 
@@ -238,19 +299,19 @@ void HostParts::run() {
   std::unique_lock lock(mutex_);
   while (!ending_) {
     hurries_ = false;
-    for (std::size_t t = 0; t < takes_.size(); ++t) {
-      for (std::size_t p = 0; p < takes_[t].parts.size() && !ending_; ++p) {
+    // The newest first: it may have to be begun.
+    for (std::size_t t = takes_.size(); t-- > 0;) {
+      for (std::size_t p = 0; t < takes_.size() && p < takes_[t].parts.size() && !ending_; ++p) {
         const Take take = takes_[t];
-        if (take.parts[p].settled) continue;
+        if (take.parts[p].settled || take.parts[p].busy) continue;
         lock.unlock();
         Part part = asked(take, take.parts[p]);
         lock.lock();
-        take_over(take.folder, p, std::move(part));
+        take_over(take.session_id, p, std::move(part));
       }
     }
     looked_.notify_all();
-    for (Take& take : takes_)
-      if (take.closed && take.behind) static_cast<void>(write(take));  // else later
+    write_behind(lock);
     std::erase_if(takes_, [](const Take& take) {
       return take.closed && !take.behind &&
              std::all_of(take.parts.begin(), take.parts.end(), [](const Part& part) { return part.settled; });

@@ -39,14 +39,16 @@ class HostParts {
   [[nodiscard]] bool any() const { return !hosts_.empty(); }
   [[nodiscard]] std::vector<std::string> addresses() const;
   [[nodiscard]] const std::string& leader() const { return leader_; }
+  /// What the clock of a host shows now, where it is known.
+  [[nodiscard]] std::optional<v1::ClockReading> clock(const std::string& address) const;
   /// Each host's status, with how many parts are asked of it.
   [[nodiscard]] std::vector<v1::HostStatus> hosts() const;
 
-  /// Begins the parts of a session, all hosts at once, and waits for their answers: RemoteHost::kPatience at
-  /// most. A request is for the host that its place says. A host that doesn't answer begins when it does, as
-  /// long as the recording lasts. `folder` is this host's own part. Returns all parts.
-  std::vector<v1::HostPart> begin(const std::filesystem::path& folder,
-                                  const std::vector<v1::PartRequest>& requests);
+  /// Has the parts of a session begun, all hosts at once, without waiting for their answers. A request is for
+  /// the host that its place says; `known` is what this host's manifest says of the part. A host that doesn't
+  /// answer begins when it does, as long as the recording lasts. `folder` is this host's own part.
+  void begin(const std::filesystem::path& folder, const std::vector<v1::PartRequest>& requests,
+             const std::vector<v1::HostPart>& known);
   /// The recording ends, or ended, at this instant of this host's clock.
   void end(const std::filesystem::path& folder, TimePoint at);
   /// This host's own part is finished: waits until the others are known, at most `patience`, and writes into
@@ -65,7 +67,9 @@ class HostParts {
     std::shared_ptr<RemoteHost> host;        ///< null: it isn't one of the rig's any more
     std::optional<v1::PartRequest> request;  ///< to begin it with; absent after a restart
     v1::HostPart known;
-    Seconds late{0};  ///< it began so much after the recording
+    bool begun = false;  ///< its host said so
+    bool busy = false;   ///< it is being begun
+    Seconds late{0};     ///< it began so much after the recording, at most
     bool settled = false;
     bool wanting = false;  ///< as it was told
   };
@@ -83,10 +87,10 @@ class HostParts {
   static Part asked(const Take& take, Part part);
   static void begin(Part& part, const std::filesystem::path& folder);
   static void settle(const Take& take, const v1::HostPart& there, Part& part);
+  void write_behind(std::unique_lock<std::mutex>& lock);
   // These require the lock.
   Take* find(const std::filesystem::path& folder);
-  void take_over(const std::filesystem::path& folder, std::size_t place, Part part);
-  Status write(Take& take);
+  void take_over(const std::string& session_id, std::size_t place, Part part);
 
   const Hosts hosts_;
   const std::string leader_;
@@ -96,6 +100,7 @@ class HostParts {
   bool ending_ = false;
   bool hurries_ = false;
   std::vector<Take> takes_;
+  std::vector<std::thread> beginning_;  ///< of the newest take
   std::vector<PartNews> news_;
   std::thread thread_;  ///< last: it uses all of the above; none without hosts
 };

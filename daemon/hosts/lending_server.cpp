@@ -52,8 +52,9 @@ class LendingService final : public v1::Lending::Service {
                     v1::Empty* /*done*/) override {
     return grpc_status(lender_.trim(*request));
   }
-  grpc::Status Record(grpc::ServerContext* /*context*/, const v1::PartRequest* request,
+  grpc::Status Record(grpc::ServerContext* context, const v1::PartRequest* request,
                       v1::HostPart* part) override {
+    if (context->IsCancelled()) return grpc::Status::CANCELLED;  // its leader doesn't wait any more
     return put(lender_.record_part(*request), *part);
   }
   grpc::Status StopPart(grpc::ServerContext* /*context*/, const v1::StopPartRequest* request,

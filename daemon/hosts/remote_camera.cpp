@@ -28,7 +28,8 @@ Error RemoteCamera::away() const {
 Status RemoteCamera::start() {
   {
     const std::lock_guard lock(mutex_);
-    if (thread_.joinable() && !ended_ && host_->connected()) return {};
+    const bool streams = thread_.joinable() && !ended_ && SteadyClock().now() - last_ <= kSilence;
+    if (streams && host_->connected()) return {};
   }
   stop();
   // What doesn't answer the clock's questions would take this thread's time.
@@ -43,12 +44,14 @@ Status RemoteCamera::start() {
   if (found->state() != v1::CameraStatus::FILMING)
     return Error{ErrorKind::device, "it doesn't film", "camera " + info_.id + " at " + host_->address(),
                  "See to it there; it is taken up by itself"};
-  // Until its first frame, a camera has no picture's size.
-  if (found->stream().width() > 0) {
-    EMBERLOCK_ASSIGN_OR_RETURN(info_, drivers::camera_info(found->stream()));
-  }
+  // Before it is opened, a camera has no picture's size.
+  if (found->stream().width() == 0)
+    return Error{ErrorKind::device, "it is just being opened",
+                 "camera " + info_.id + " at " + host_->address(), "It is taken up by itself"};
+  EMBERLOCK_ASSIGN_OR_RETURN(info_, drivers::camera_info(found->stream()));
   ended_.reset();
   told_.reset();
+  last_ = SteadyClock().now();
   call_.emplace();
   thread_ = std::thread([this, id = info_.id] {
     Status end = host_->watch(id, *call_, [this](const v1::LentFrame& lent) { take(lent); });
@@ -73,6 +76,7 @@ void RemoteCamera::stop() {
 void RemoteCamera::take(const v1::LentFrame& lent) {
   Result<Frame> frame = frame_of(lent, "camera " + info_.id + " at " + host_->address());
   const std::lock_guard lock(mutex_);
+  last_ = SteadyClock().now();
   count(counts_of(lent.counts()), lent.damaged());
   if (!frame.ok()) {
     ended_ = frame.error();
@@ -129,8 +133,10 @@ Result<Frame> RemoteCamera::next_frame(Seconds deadline) {
     error.kind = ErrorKind::device;
     return error;
   }
+  const Seconds silence = SteadyClock().now() - last_;
   lock.unlock();
-  if (!host_->connected()) return away();
+  const Seconds frame = info_.frame_rate > Hertz(0) ? period(info_.frame_rate) : Seconds(0);
+  if (!host_->connected() || silence > std::max(kSilence, 3 * frame)) return away();
   return Error{ErrorKind::timed_out, "no frame came in time",
                "camera " + info_.id + " at " + host_->address(), "Wait longer than a frame period"};
 }

@@ -37,6 +37,7 @@ class RemoteCamera final : public drivers::Camera {
 
  private:
   static constexpr std::size_t kQueued = 16;
+  static constexpr Seconds kSilence{5};  ///< after which it counts as lost, or three frames' time
   void take(const v1::LentFrame& lent);
   /// Requires the lock.
   void count(const drivers::FrameCounts& now, bool damaged);
@@ -50,6 +51,7 @@ class RemoteCamera final : public drivers::Camera {
   mutable std::mutex mutex_;
   std::condition_variable came_;
   std::deque<Frame> frames_;
+  TimePoint last_;               ///< when a frame came, or the stream began
   TimePoint wanted_from_;        ///< earlier frames show the phase before a reset
   std::optional<Status> ended_;  ///< the stream's end; absent while it runs
   drivers::FrameCounts counts_;

@@ -155,7 +155,16 @@ TimePoint RemoteHost::there(TimePoint here) const {
 Result<v1::LentCameras> RemoteHost::borrow() {
   v1::LentCameras cameras;
   EMBERLOCK_RETURN_IF_ERROR(ask(&Stub::Borrow, v1::LeaderRequest{}, cameras));
+  const std::lock_guard lock(mutex_);
+  lent_ = cameras;
   return cameras;
+}
+
+std::optional<v1::LentCameras::Camera> RemoteHost::camera(const std::string& id) const {
+  const std::lock_guard lock(mutex_);
+  for (const v1::LentCameras::Camera& camera : lent_.cameras())
+    if (camera.stream().camera_id() == id) return camera;
+  return std::nullopt;
 }
 
 Status RemoteHost::watch(const std::string& camera_id, grpc::ClientContext& call,

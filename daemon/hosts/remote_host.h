@@ -51,6 +51,8 @@ class RemoteHost {
   [[nodiscard]] TimePoint there(TimePoint here) const;
 
   Result<v1::LentCameras> borrow();
+  /// A camera, as borrow() brought it last.
+  [[nodiscard]] std::optional<v1::LentCameras::Camera> camera(const std::string& id) const;
   /// Hands on each frame of the camera, as the host stamped it, until the call is cancelled by its context or
   /// ends; returns why it did.
   Status watch(const std::string& camera_id, grpc::ClientContext& call,
@@ -81,6 +83,7 @@ class RemoteHost {
   std::condition_variable ends_;
   bool ending_ = false;
   ClockOffset offset_;
+  v1::LentCameras lent_;                                              ///< as they were borrowed last
   Status answer_{Error{ErrorKind::device, "it wasn't reached yet"}};  ///< to the newest question
   std::thread thread_;                                                ///< last: it uses all of the above
 };

@@ -263,6 +263,13 @@ std::vector<smear::CcdTiming> Rig::timing() const {
     timing.rows = config.rows.value_or(member.camera->info().layout.size.height);
     timing.shifts = config.shifts.value_or(timing.rows);
     timing.direction = config.direction;
+    if (config.source == CameraSource::remote && options_.remote_timing) {
+      if (const auto there = options_.remote_timing(config)) {
+        timing = *there;
+        timing.rows = config.rows.value_or(timing.rows);
+        timing.shifts = config.shifts.value_or(timing.shifts);
+      }
+    }
     timing.row_time = config.row_time.value_or(timing.row_time);
     if (config.source == CameraSource::virtual_) {
       // From a data sheet; t_row is measured.

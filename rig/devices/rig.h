@@ -33,6 +33,8 @@ struct RigOptions {
   /// Opens a camera of driver "remote": the daemon's business. Absent: there are none.
   std::function<std::unique_ptr<drivers::Camera>(const CameraConfig& config, drivers::CameraInfo expected)>
       remote = {};
+  /// The read-out timing of such a camera, as its host is told it; nothing before the host was reached.
+  std::function<std::optional<smear::CcdTiming>(const CameraConfig& config)> remote_timing = {};
 };
 
 /// The configured cameras and strobe. In real time every camera has its own thread (drivers/camera_thread.h);
@@ -80,7 +82,8 @@ class Rig {
     return cameras_.at(index).camera->counts();
   }
 
-  /// Each camera's read-out timing from the configuration; for missing values, from its picture.
+  /// Each camera's read-out timing from the configuration; for missing values, from its host's, else from its
+  /// picture.
   [[nodiscard]] std::vector<smear::CcdTiming> timing() const;
   /// The options for aligning this rig: its timings, the reference by its id, and the learnt delays. Errors:
   /// bad_input (no such camera; an unreadable file of delays).

@@ -1,11 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <algorithm>
 #include <chrono>
+#include <cmath>
 #include <csignal>
 #include <filesystem>
 #include <fstream>
 #include <memory>
+#include <optional>
+#include <stdexcept>
 #include <string>
 #include <thread>
 #include <vector>
@@ -15,7 +19,10 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include "base/quantity.h"
+#include "base/time_point.h"
 #include "base/unique_fd.h"
+#include "session/reader.h"
 #include "tests/support/certificate.h"
 #include "tests/support/shell.h"
 
@@ -117,6 +124,8 @@ class LabHost {
   LabHost& operator=(const LabHost&) = delete;
   ~LabHost() { kill(); }
 
+  /// Its monotonic clock is so much ahead of the machine's.
+  [[nodiscard]] Seconds ahead() const { return Seconds(1000.0 * setup_.number); }
   [[nodiscard]] std::filesystem::path sessions() const { return folder_ / "sessions"; }
   [[nodiscard]] std::string address() const { return HostNetwork::address(setup_.number) + ":7143"; }
   void lends() { rest_ += "listen = \"" + address() + "\"\n"; }
@@ -127,13 +136,12 @@ class LabHost {
                     other->letter() + "-0" + std::to_string(i) + "\"\n";
     cameras_ += "[rig.strobe]\ndriver = \"virtual\"\n";
   }
-  /// Its monotonic clock is a thousand seconds ahead for each host before it.
   void start() {
     write_private(folder_ / "d.toml", cameras_ + rest_);
     pid_ = ::fork();
     if (pid_ != 0) return;
     network_.enter(setup_.number);
-    const std::string ahead = std::to_string(1000 * setup_.number);
+    const std::string ahead = std::to_string(std::llround(this->ahead().value()));
     const std::string config = (folder_ / "d.toml").string();
     ::execlp("unshare", "unshare", "--time", "--monotonic", ahead.c_str(), "--fork", "--kill-child",
              programs_.emberlockd.c_str(), "--config", config.c_str(), nullptr);
@@ -176,5 +184,25 @@ class LabHost {
   std::string rest_;
   pid_t pid_ = -1;
 };
+
+/// Between the first and the last of all hosts' cameras, as their frames arrived when a session began:
+/// simulated ones stamp a frame with the very instant at which its read phase ended.
+inline Seconds true_worst_pair(const std::vector<const LabHost*>& hosts, const std::string& session,
+                               Hertz rate) {
+  std::optional<TimePoint> first;
+  Seconds earliest, latest;
+  for (const LabHost* host : hosts) {
+    const auto reader = session::SessionReader::open(host->sessions() / session);
+    if (!reader) throw std::runtime_error(reader.error().message());
+    for (std::size_t i = 0; i < reader->camera_count(); ++i) {
+      const TimePoint at = reader->stamps(i).at(0).monotonic_time - host->ahead();
+      first = first.value_or(at);
+      const Seconds late = wrap_symmetric(at - *first, period(rate));
+      earliest = std::min(earliest, late);
+      latest = std::max(latest, late);
+    }
+  }
+  return latest - earliest;
+}
 
 }  // namespace emberlock::test

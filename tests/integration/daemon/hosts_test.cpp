@@ -101,8 +101,12 @@ TEST_F(Hosts, TwoAreLockedByOneStrobeAndRecordOneSession) {
   ASSERT_TRUE(aligns());
   EXPECT_THAT(others_[0]->client("align").output, HasSubstr("lent to dome at"));
   EXPECT_THAT(others_[0]->client("record mine --unlocked").output, HasSubstr("lent to dome at"));
+  const double known = status()["alignment"]["worst_pair_s"];
   const Shell record = leader_->client("record take --seconds 2");
   EXPECT_EQ(record.status, 0) << record.output;
+  const Seconds truth = test::true_worst_pair({leader_.get(), others_[0].get()}, "take", Hertz(23.976));
+  EXPECT_NEAR(known, truth.value(), 0.05 * truth.value() + 2e-4)
+      << "the other host's sensors are read rightly";
 
   const v1::Manifest whole = manifest(*leader_, "take");
   EXPECT_EQ(whole.cameras_size(), kCamerasAHost);

@@ -63,6 +63,13 @@ TEST(ClockOffset, OldAnswersAreForgotten) {
   EXPECT_NEAR(static_cast<double>(offset.reading(ms(2500))->ahead_ns() - kAhead), 0, 1000);
 }
 
+TEST(ClockOffset, OfAMachineThatWasStartedAnewTheOldAnswersAreForgottenAtOnce) {
+  ClockOffset offset;
+  offset.add(ms(0), {ms(0.1).ns + kAhead}, ms(0.2));
+  offset.add(ms(5000), ms(5060), ms(5120));  // the first answer after it takes long
+  EXPECT_NEAR(static_cast<double>(offset.reading(ms(5120))->ahead_ns()), 0, 60e6);
+}
+
 TEST(ClockOffset, AnAnswerHeardBeforeItWasAskedIsLeftOut) {
   ClockOffset offset;
   offset.add(ms(10), ms(10), ms(9));

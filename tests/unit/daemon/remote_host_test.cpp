@@ -68,6 +68,7 @@ class FakeLender final : public Lender {
     recorded = request;
     part_now.set_session(request.name());
     part_now.set_state(v1::HostPart::RECORDING);
+    part_now.add_camera_ids("cam");
     return part_now;
   }
   Status stop_part(const v1::StopPartRequest& request) override {
@@ -263,9 +264,19 @@ class HostPartsTest : public RemoteHostTest {
     const auto manifest = session::read_manifest(folder);
     request.mutable_manifest()->set_session_id(manifest->session_id());
     request.mutable_manifest()->add_cameras()->set_camera_id("cam");
-    request.set_from_ns(SteadyClock().now().ns);
+    request.set_from_ns(SteadyClock().now().ns + 150'000'000);
+    known.set_session("take");
+    known.set_state(v1::HostPart::RECORDING);
+    known.add_camera_ids("cam");
+  }
+  /// The host that the parts are of.
+  std::shared_ptr<RemoteHost> known_host() {
+    auto host = reach();
+    known.set_host(host->address());
+    return host;
   }
   [[nodiscard]] v1::HostPart kept() const { return session::read_manifest(folder)->hosts(0); }
+  void begin(HostParts& parts) const { parts.begin(folder, {request}, {known}); }
   static bool any_news(HostParts& parts, v1::HostPart::State state) {
     return wait_until([&] {
       for (const PartNews& news : parts.news())
@@ -276,14 +287,18 @@ class HostPartsTest : public RemoteHostTest {
 
   fs::path folder;
   v1::PartRequest request;
+  v1::HostPart known;
 };
 
 TEST_F(HostPartsTest, APartIsBegunEndedAndKnownToBeWhole) {
-  HostParts parts({reach()}, "dome at here");
-  const auto begun = parts.begin(folder, {request});
-  ASSERT_EQ(begun.size(), 1U);
-  EXPECT_EQ(begun[0].state(), v1::HostPart::RECORDING) << begun[0].why();
-  ASSERT_TRUE(lender.recorded);
+  HostParts parts({known_host()}, "dome at here");
+  begin(parts);
+  ASSERT_TRUE(wait_until([&] {
+    const std::lock_guard lock(lender.mutex);
+    return lender.recorded.has_value();
+  }));
+  ASSERT_EQ(parts.of(folder).size(), 1U);
+  EXPECT_EQ(parts.of(folder)[0].state(), v1::HostPart::RECORDING);
   EXPECT_EQ(lender.recorded->name(), "take");
   EXPECT_EQ(lender.recorded->leader(), "dome at here");
   parts.end(folder, SteadyClock().now());
@@ -297,8 +312,8 @@ TEST_F(HostPartsTest, APartIsBegunEndedAndKnownToBeWhole) {
 
 TEST_F(HostPartsTest, OneThatEndsEarlyIsShort) {
   lender.early_ns = 3'000'000'000;
-  HostParts parts({reach()});
-  static_cast<void>(parts.begin(folder, {request}));
+  HostParts parts({known_host()});
+  begin(parts);
   parts.end(folder, SteadyClock().now());
   ASSERT_TRUE(parts.close(folder, Seconds(10)).ok());
   EXPECT_EQ(kept().state(), v1::HostPart::SHORT);
@@ -307,12 +322,11 @@ TEST_F(HostPartsTest, OneThatEndsEarlyIsShort) {
 
 TEST_F(HostPartsTest, OneThatCantBeginIsMissingAndBeginsWhenItCan) {
   lender.refuses = true;
-  HostParts parts({reach()});
-  const auto begun = parts.begin(folder, {request});
-  EXPECT_EQ(begun[0].state(), v1::HostPart::MISSING);
-  EXPECT_THAT(begun[0].why(), HasSubstr("its disk is full"));
-  EXPECT_EQ(parts.hosts()[0].parts_wanting(), 1U);
+  HostParts parts({known_host()});
+  begin(parts);
   EXPECT_TRUE(any_news(parts, v1::HostPart::MISSING));
+  EXPECT_THAT(parts.of(folder)[0].why(), HasSubstr("its disk is full"));
+  EXPECT_EQ(parts.hosts()[0].parts_wanting(), 1U);
   {
     SteadyClock().sleep_until(SteadyClock().now() + milliseconds(600));
     const std::lock_guard lock(lender.mutex);
@@ -327,8 +341,9 @@ TEST_F(HostPartsTest, OneThatCantBeginIsMissingAndBeginsWhenItCan) {
 }
 
 TEST_F(HostPartsTest, OneWhoseHostIsAwayIsMissingAndKnownWhenItIsBack) {
-  auto parts = std::make_unique<HostParts>(HostParts::Hosts{reach()});
-  static_cast<void>(parts->begin(folder, {request}));
+  auto parts = std::make_unique<HostParts>(HostParts::Hosts{known_host()});
+  begin(*parts);
+  ASSERT_TRUE(wait_until([&] { return parts->of(folder)[0].clock_size() > 0; }));
   server.reset();
   parts->end(folder, SteadyClock().now());
   ASSERT_TRUE(any_news(*parts, v1::HostPart::MISSING));
@@ -343,9 +358,32 @@ TEST_F(HostPartsTest, OneWhoseHostIsAwayIsMissingAndKnownWhenItIsBack) {
   EXPECT_TRUE(any_news(*parts, v1::HostPart::WHOLE));
 }
 
+TEST_F(HostPartsTest, OneThatWasBegunAndIsntFoundIsMissingNotShort) {
+  HostParts parts({known_host()});
+  begin(parts);
+  ASSERT_TRUE(wait_until([&] { return parts.of(folder)[0].clock_size() > 0; }));
+  {
+    const std::lock_guard lock(lender.mutex);
+    lender.recorded.reset();
+  }
+  EXPECT_TRUE(any_news(parts, v1::HostPart::MISSING));
+  EXPECT_THAT(parts.of(folder)[0].why(), HasSubstr("disk"));
+}
+
+TEST_F(HostPartsTest, AClockThatWasSetAnewMeanwhileIsntJoinedWithTheOldOne) {
+  HostParts parts({known_host()});
+  v1::ClockReading& before = *known.add_clock();
+  before.set_at_ns(SteadyClock().now().ns - 1'000'000'000);
+  before.set_ahead_ns(5'000'000'000'000);  // before the machine was started anew
+  begin(parts);
+  parts.end(folder, SteadyClock().now());
+  ASSERT_TRUE(parts.close(folder, Seconds(10)).ok());
+  EXPECT_EQ(kept().clock_size(), 1);
+}
+
 TEST_F(HostPartsTest, WhatIsWholeIsntAskedForAgain) {
-  HostParts parts({reach()});
-  static_cast<void>(parts.begin(folder, {request}));
+  HostParts parts({known_host()});
+  begin(parts);
   parts.end(folder, SteadyClock().now());
   ASSERT_TRUE(parts.close(folder, Seconds(10)).ok());
   HostParts again({reach()});

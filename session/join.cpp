@@ -123,6 +123,7 @@ Status check_together(const std::vector<JoinPart>& parts, const JoinPart& leader
 
 Error missing_parts(const JoinPart& leader, const std::vector<v1::HostPart>& missing) {
   std::vector<std::string> names;
+  names.reserve(missing.size());
   for (const v1::HostPart& host : missing)
     names.push_back(fmt::format("\"{}\" of {}", host.session(), host.host()));
   return wrong_part(leader.folder,

@@ -128,6 +128,39 @@ TEST_F(Hosts, TwoAreLockedByOneStrobeAndRecordOneSession) {
   }
 }
 
+TEST_F(Hosts, TheStrobesCodeSaysWhichOfTheirFramesBelongTogether) {
+  ASSERT_NO_FATAL_FAILURE(begin(1));
+  ASSERT_TRUE(aligns());
+  const double row_time_s = status()["alignment"]["row_time_s"];
+  ASSERT_EQ(leader_->client("align --stop").status, 0);
+  // A hundredth faster than the cameras: the dots wander through the pictures.
+  ASSERT_EQ(leader_->client("strobe --frame-code --play --rate 24.2").status, 0);
+  ASSERT_EQ(leader_->client("record code --purpose alignment --unlocked --seconds 25").status, 0);
+  const fs::path joined = temp_ / "joined";
+  const Shell join =
+      shell(std::string(EMBERLOCK_PROGRAM) + " sessions join " + (others_[0]->sessions() / "code").string() +
+            " " + (leader_->sessions() / "code").string() + " --out " + joined.string());
+  ASSERT_EQ(join.status, 0) << join.output;
+  EXPECT_TRUE(session::verify_session(joined)->whole());
+  const auto reader = session::SessionReader::open(joined);
+  ASSERT_TRUE(reader.ok()) << reader.error().message();
+  ASSERT_EQ(reader->camera_count(), 2U * kCamerasAHost);
+  for (std::size_t i = 1; i < reader->camera_count(); ++i)
+    EXPECT_LT(abs(reader->stamps(i)[0].monotonic_time - reader->stamps(0)[0].monotonic_time), Seconds(0.05))
+        << "on one clock";
+  const Shell verified =
+      shell(std::string(EMBERLOCK_PROGRAM) + " verify " + joined.string() +
+            "/*/000000.nut --flash-rate 24.2 --shifts 260 --tolerance 60rows --json --row-time-us " +
+            std::to_string(1e6 * row_time_s) + " 2>/dev/null");
+  const auto said = nlohmann::json::parse(verified.output, nullptr, false);
+  ASSERT_TRUE(said.is_object()) << verified.output;
+  ASSERT_EQ(said["cameras"].size(), 2U * kCamerasAHost);
+  for (std::size_t i = 1; i < said["cameras"].size(); ++i) {
+    EXPECT_EQ(said["cameras"][i]["offset_by"], "code") << said["cameras"][i];
+    EXPECT_EQ(said["cameras"][i]["frame_offset"], 0) << said["cameras"][i];
+  }
+}
+
 TEST_F(Hosts, OneThatIsCutOffRecordsOnAndTheSessionIsWholeAfterwards) {
   ASSERT_NO_FATAL_FAILURE(begin(2));
   std::thread recording(

@@ -52,7 +52,7 @@ describe.each([kSizes[0], kPhone])('axe at $width x $height', size => {
                                              {host: 'lab-3:7143', light: 'RED' as const, reason: 'it does not answer', connected: false, cameras: 0, clock_sigma_s: 0, round_trip_s: 0, parts_wanting: 1}],
                         cameras: locked().cameras!.map((each, index) => ({...each, host: index === 10 ? 'lab-2:7143' : ''})),
                         recording: {...capturing(8).recording!, state: 'COMPLETE' as const, hosts: [
-                          {host: 'lab-3:7143', session: 'candle 1', camera_ids: ['far'], state: 'MISSING' as const, why: 'it does not answer', clock: [], frames: 0, lost: 0}]}},
+                          {host: 'lab-3:7143', session: 'candle 1', camera_ids: ['far'], state: 'MISSING' as const, why: 'it does not answer', clock: [], frames: 0, lost: 0, until_ns: 0}]}},
       lent: {...idle(), hosts: [], lent_to: 'dome at lab-1'},
       refused: {...noLamp(), lent_to: '', alignment: alignment(0, {verdict: 'REFUSED', reason: '10 rows would take about 400 resets; 60 are allowed.', offers})},
     };

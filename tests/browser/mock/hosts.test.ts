@@ -19,7 +19,7 @@ function host(name: string, change: Partial<HostStatus> = {}): HostStatus {
 const gone = (change: Partial<HostStatus> = {}) => host(kSecond, {light: 'RED', connected: false, cameras: 3, clock_ahead_s: undefined, reason: 'Nobody answers at lab-3:7143. It is asked again every second.', ...change});
 
 function part(name: string, state: HostPart['state'], change: Partial<HostPart> = {}): HostPart {
-  return {host: name, session: '2026-11-22_031500', camera_ids: ['a', 'b', 'c'], state, why: '', clock: [], frames: 0, lost: 0, ...change};
+  return {host: name, session: '2026-11-22_031500', camera_ids: ['a', 'b', 'c'], state, why: '', clock: [], frames: 0, lost: 0, until_ns: 0, ...change};
 }
 
 /** The last seven of eleven cameras are others': four of one host, three of another. */

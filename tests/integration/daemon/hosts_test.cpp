@@ -148,10 +148,10 @@ TEST_F(Hosts, TheStrobesCodeSaysWhichOfTheirFramesBelongTogether) {
   for (std::size_t i = 1; i < reader->camera_count(); ++i)
     EXPECT_LT(abs(reader->stamps(i)[0].monotonic_time - reader->stamps(0)[0].monotonic_time), Seconds(0.05))
         << "on one clock";
-  const Shell verified =
-      shell(std::string(EMBERLOCK_PROGRAM) + " verify " + joined.string() +
-            "/*/000000.nut --flash-rate 24.2 --shifts 260 --tolerance 60rows --json --row-time-us " +
-            std::to_string(1e6 * row_time_s) + " 2>/dev/null");
+  const Shell verified = shell("(" + std::string(EMBERLOCK_PROGRAM) + " verify " + joined.string() +
+                               "/*/000000.nut --flash-rate 24.2 --shifts 260 --tolerance 60rows --json "
+                               "--row-time-us " +
+                               std::to_string(1e6 * row_time_s) + " 2>/dev/null)");
   const auto said = nlohmann::json::parse(verified.output, nullptr, false);
   ASSERT_TRUE(said.is_object()) << verified.output;
   ASSERT_EQ(said["cameras"].size(), 2U * kCamerasAHost);

@@ -32,15 +32,18 @@ using test::write_private;
 
 class Hosts : public ::testing::Test {
  protected:
+  void SetUp() override {
+    if (::geteuid() != 0) GTEST_SKIP() << "network namespaces need root";
+    const test::HostNetwork probe(0);
+    if (probe.trouble().find("not permitted") != std::string::npos) GTEST_SKIP() << probe.trouble();
+  }
   [[nodiscard]] std::unique_ptr<test::LabHost> make_host(int number) const {
     return std::make_unique<test::LabHost>(
         test::LabHost::Setup{temp_.path(), number, kCamerasAHost, "320x240"}, *network_, authority_,
         test::LabHost::Programs{EMBERLOCKD_PROGRAM, EMBERLOCK_PROGRAM});
   }
   void begin(int others) {
-    if (::geteuid() != 0) GTEST_SKIP() << "network namespaces need root";
     network_ = std::make_unique<test::HostNetwork>(others + 1);
-    if (network_->trouble().find("not permitted") != std::string::npos) GTEST_SKIP() << network_->trouble();
     ASSERT_EQ(network_->trouble(), "");
     leader_ = make_host(0);
     for (int i = 1; i <= others; ++i) {

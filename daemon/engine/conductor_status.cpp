@@ -8,6 +8,7 @@
 #include "base/version.h"
 #include "daemon/engine/conductor.h"
 #include "daemon/engine/words.h"
+#include "daemon/hosts/lent_frame.h"
 #include "drivers/replay/record.h"
 #include "smear_sync/align/align_words.h"
 
@@ -170,16 +171,7 @@ void Conductor::describe_cameras(v1::DaemonStatus& status) const {
     camera.set_measured_rate_hz(watch_.rate(i));
     camera.set_reset(stream.shutter_reset());
     camera.set_sensor(stream.sensor());
-    const drivers::FrameCounts counts = devices_.cameras[i]->counts();
-    v1::CameraCounts& shown = *camera.mutable_counts();
-    shown.set_delivered(counts.delivered);
-    shown.set_damaged(counts.damaged);
-    shown.set_camera_gap(counts.camera_gap);
-    shown.set_transport(counts.transport);
-    shown.set_resend(counts.resend);
-    shown.set_underrun(counts.underrun);
-    shown.set_queue(counts.queue);
-    shown.set_passed_over(counts.passed_over);
+    *camera.mutable_counts() = to_proto(devices_.cameras[i]->counts());
     camera.set_light(v1::GREEN);
     camera.set_reason(words(v1::CameraStatus::FILMING));
     camera.set_lost_lately(overload_.lost_lately(i));

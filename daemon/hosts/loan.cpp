@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "daemon/hosts/loan.h"
 
-#include <algorithm>
 #include <chrono>
 #include <utility>
 
@@ -64,11 +63,6 @@ void Loan::hold(bool held) {
 std::string Loan::leader(TimePoint now) const {
   const std::lock_guard lock(mutex_);
   return lapsed(now) ? std::string() : leader_;
-}
-
-Seconds Loan::silence(TimePoint now) const {
-  const std::lock_guard lock(mutex_);
-  return leader_.empty() ? Seconds(0) : std::max(now - heard_, Seconds(0));
 }
 
 std::shared_ptr<LentFrames> Loan::watch(std::size_t camera) {

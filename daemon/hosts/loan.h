@@ -56,8 +56,6 @@ class Loan {
   void hold(bool held);
   /// Empty: nobody.
   [[nodiscard]] std::string leader(TimePoint now) const;
-  /// Since the leader was heard of; 0 where nobody has the cameras.
-  [[nodiscard]] Seconds silence(TimePoint now) const;
 
   /// Another watcher of a camera takes the place of the one before.
   std::shared_ptr<LentFrames> watch(std::size_t camera);

@@ -115,7 +115,7 @@ TEST_F(Hosts, TwoAreLockedByOneStrobeAndRecordOneSession) {
   EXPECT_EQ(part.state(), v1::HostPart::WHOLE) << part.why();
   EXPECT_EQ(part.host(), others_[0]->address());
   EXPECT_EQ(part.lost(), 0U);
-  EXPECT_NEAR(static_cast<double>(part.frames()), 2 * 48, 4);
+  EXPECT_GE(part.frames(), 2 * 48U - 4);
   ASSERT_GE(part.clock_size(), 2);
   EXPECT_NEAR(1e-9 * static_cast<double>(part.clock(0).ahead_ns()), 1000, 0.02);
   const v1::Manifest there = manifest(*others_[0], "take");
@@ -166,7 +166,7 @@ TEST_F(Hosts, TheStrobesCodeSaysWhichOfTheirFramesBelongTogether) {
 
 TEST_F(Hosts, OneThatIsCutOffRecordsOnAndTheSessionIsWholeAfterwards) {
   ASSERT_NO_FATAL_FAILURE(begin(2));
-  std::thread recording(
+  std::jthread recording(
       [this] { static_cast<void>(leader_->client("record take --unlocked --seconds 20")); });
   ASSERT_TRUE(leader_->answers("status", "recording  take"));
   std::this_thread::sleep_for(std::chrono::seconds(2));
@@ -187,13 +187,13 @@ TEST_F(Hosts, OneThatIsCutOffRecordsOnAndTheSessionIsWholeAfterwards) {
   const v1::Manifest whole = manifest(*leader_, "take");
   for (const v1::HostPart& part : whole.hosts()) {
     EXPECT_EQ(part.lost(), 0U) << part.host();
-    EXPECT_NEAR(static_cast<double>(part.frames()), 20 * 48, 10) << part.host();
+    EXPECT_GE(part.frames(), 20 * 48U - 10) << part.host() << ": a busy machine may end it late, never early";
   }
 }
 
 TEST_F(Hosts, OneThatIsKilledHasWhatItHadAndTheLeaderSaysSo) {
   ASSERT_NO_FATAL_FAILURE(begin(1));
-  std::thread recording([this] { static_cast<void>(leader_->client("record take --unlocked --seconds 8")); });
+  std::jthread recording([this] { static_cast<void>(leader_->client("record take --unlocked --seconds 8")); });
   ASSERT_TRUE(leader_->answers("status", "recording  take"));
   std::this_thread::sleep_for(std::chrono::seconds(3));
   others_[0]->kill();
@@ -212,7 +212,7 @@ TEST_F(Hosts, OneThatIsKilledHasWhatItHadAndTheLeaderSaysSo) {
 
 TEST_F(Hosts, ALeaderThatIsKilledFindsThePartsWhenItIsBack) {
   ASSERT_NO_FATAL_FAILURE(begin(1));
-  std::thread recording([this] { static_cast<void>(leader_->client("record take --unlocked")); });
+  std::jthread recording([this] { static_cast<void>(leader_->client("record take --unlocked")); });
   ASSERT_TRUE(leader_->answers("status", "recording  take"));
   std::this_thread::sleep_for(std::chrono::seconds(2));
   leader_->kill();

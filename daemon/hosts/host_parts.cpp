@@ -252,13 +252,21 @@ void HostParts::settle(const Take& take, const v1::HostPart& there, Part& part) 
   const Seconds by = short_by(part.request);
   if (part.late > by)
     return set(part.known, v1::HostPart::SHORT,
-               fmt::format("its frames begin {:.1f} s after the recording does", part.late.value()));
+               fmt::format("its frames begin up to {:.1f} s after the recording does", part.late.value()));
   const auto until = here(part.known, there.until_ns());
   if (take.ended && until && *take.ended - *until > by)
     return set(
         part.known, v1::HostPart::SHORT,
         fmt::format("its frames end {:.1f} s before the recording does", (*take.ended - *until).value()));
   set(part.known, v1::HostPart::WHOLE, "");
+}
+
+/// The answer that would have said when it began was lost: before now.
+void HostParts::find_begun(Part& part) {
+  if (part.begun) return;
+  part.begun = true;
+  if (part.request)
+    part.late = std::max(SteadyClock().now() - TimePoint{part.request->from_ns()}, Seconds(0));
 }
 
 HostParts::Part HostParts::asked(const Take& take, Part part) {
@@ -282,7 +290,7 @@ HostParts::Part HostParts::asked(const Take& take, Part part) {
     part.settled = true;
     set(part.known, State::SHORT, "nothing of it was recorded there");
   } else if ((*there)->state() == State::RECORDING) {
-    part.begun = true;
+    find_begun(part);
     set(part.known, State::RECORDING, "");
     part.known.set_session((*there)->session());
     part.known.set_frames((*there)->frames());
@@ -290,6 +298,7 @@ HostParts::Part HostParts::asked(const Take& take, Part part) {
       static_cast<void>(part.host->stop_part(take.session_id, part.known.session(),
                                              take.ended.value_or(SteadyClock().now())));
   } else if (take.ended || take.restarted || (*there)->state() == State::SHORT) {
+    find_begun(part);
     settle(take, **there, part);
   }  // else it ended by its own clock, a moment before this host's recording
   return part;

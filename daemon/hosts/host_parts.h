@@ -86,6 +86,7 @@ class HostParts {
   /// What the part's host says of it, and what is done about that. Without the lock.
   static Part asked(const Take& take, Part part);
   static void begin(Part& part, const std::filesystem::path& folder);
+  static void find_begun(Part& part);
   static void settle(const Take& take, const v1::HostPart& there, Part& part);
   void write_behind(std::unique_lock<std::mutex>& lock);
   // These require the lock.

@@ -69,6 +69,7 @@ class FakeLender final : public Lender {
     part_now.set_session(request.name());
     part_now.set_state(v1::HostPart::RECORDING);
     part_now.add_camera_ids("cam");
+    if (loses_answers) return Error{ErrorKind::io, "its answer was lost"};
     return part_now;
   }
   Status stop_part(const v1::StopPartRequest& request) override {
@@ -81,6 +82,7 @@ class FakeLender final : public Lender {
   }
   Result<v1::HostPart> part(const v1::FindPartRequest& request) override {
     const std::lock_guard lock(mutex);
+    if (loses_answers) return Error{ErrorKind::io, "its answer was lost"};
     if (!recorded || recorded->manifest().session_id() != request.session_id())
       return Error{ErrorKind::out_of_data, "it has none"};
     return part_now;
@@ -90,6 +92,7 @@ class FakeLender final : public Lender {
   std::string asked_by;
   bool films = true;
   bool refuses = false;
+  bool loses_answers = false;  ///< to Record and to Part
   Loan loan{1};
   std::vector<v1::ResetRequest> resets;
   double trim_ppm = 0;
@@ -338,6 +341,24 @@ TEST_F(HostPartsTest, OneThatCantBeginIsMissingAndBeginsWhenItCan) {
   ASSERT_TRUE(parts.close(folder, Seconds(10)).ok());
   EXPECT_EQ(kept().state(), v1::HostPart::SHORT);
   EXPECT_THAT(kept().why(), HasSubstr("after the recording does"));
+}
+
+TEST_F(HostPartsTest, OneOfWhichItIsNotKnownWhenItBeganIsntCalledWhole) {
+  lender.loses_answers = true;
+  HostParts parts({known_host()});
+  begin(parts);
+  EXPECT_TRUE(any_news(parts, v1::HostPart::MISSING));
+  SteadyClock().sleep_until(SteadyClock().now() + milliseconds(800));
+  {
+    const std::lock_guard lock(lender.mutex);
+    ASSERT_TRUE(lender.recorded.has_value());
+    lender.loses_answers = false;
+  }
+  EXPECT_TRUE(any_news(parts, v1::HostPart::RECORDING));
+  parts.end(folder, SteadyClock().now());
+  ASSERT_TRUE(parts.close(folder, Seconds(10)).ok());
+  EXPECT_EQ(kept().state(), v1::HostPart::SHORT);
+  EXPECT_THAT(kept().why(), HasSubstr("its frames begin up to"));
 }
 
 TEST_F(HostPartsTest, OneWhoseHostIsAwayIsMissingAndKnownWhenItIsBack) {

@@ -7,7 +7,7 @@ import {fileURLToPath} from 'node:url';
 import type {Browser, Locator, Page} from 'playwright-core';
 import {afterAll, afterEach, beforeAll, expect, test} from 'vitest';
 
-import type {DaemonStatus, ListSessionsResponse, Manifest} from '../../../daemon/console/src/api.gen';
+import type {DaemonStatus, ListSessionsResponse, Manifest, ReconstructionStatus} from '../../../daemon/console/src/api.gen';
 import {decode} from '../../../daemon/console/src/wire';
 import {openPage, screenshot, startChromium, until, type Watched} from '../support/chromium';
 import {Daemon, virtualRig} from '../support/daemon';
@@ -312,13 +312,20 @@ test('the volume is seen, and turns by mouse and by key', async () => {
 
 test('two frames, one after the other, are played', async () => {
   const {cameras, frames} = (decode('ListSessionsResponse', await daemon.call('Sessions/List')) as ListSessionsResponse).sessions.find(({session}) => session === 'walk')!;
-  const first = Math.floor(frames / cameras / 2);
-  await page.getByLabel('Frame of walk to reconstruct', {exact: true}).fill(String(first));
-  await page.getByLabel('Last frame of walk to reconstruct, of several').fill(String(first + 1));
-  await page.getByRole('button', {name: 'Reconstruct walk'}).click();
-  await page.locator('.sequence .tally').waitFor();
-  const tally = await until(() => text('.sequence .tally'), words => words === 'Frames: 2 of 2 done' || words.includes('failed'), 'both are done', 600);
-  expect(tally, await text('#reconstruction')).toBe('Frames: 2 of 2 done');
+  const middle = Math.floor(frames / cameras / 2);
+  // Beside a browser, cameras in real time lose frames: some instants aren't known to all of them.
+  let first = middle;
+  let ended: ReconstructionStatus | undefined;
+  for (const away of [0, 5, -5, 10, -10]) {
+    first = middle + away;
+    await page.getByLabel('Frame of walk to reconstruct', {exact: true}).fill(String(first));
+    await page.getByLabel('Last frame of walk to reconstruct, of several').fill(String(first + 1));
+    await page.getByRole('button', {name: 'Reconstruct walk'}).click();
+    ended = await until(async () => (await daemon.status()).reconstruction!, ({frames: two, state}) => two[0]?.frame === first && state !== 'RUNNING', 'both have ended', 600);
+    if (lost === 0 || !ended.error.includes('has no complete frame')) break;
+  }
+  expect(ended!.state, ended!.error).toBe('DONE');
+  await until(() => text('.sequence .tally'), words => words === 'Frames: 2 of 2 done', 'both are done');
   await until(() => text('.player .label'), words => words.startsWith(`frame ${first + 1}, 2 of 2: error `), 'the last one is shown');
   await page.getByRole('slider', {name: 'Frame of the sequence'}).press('Home');
   await until(() => text('.player .label'), words => words.startsWith(`frame ${first}, 1 of 2: error `), 'the first one is shown');

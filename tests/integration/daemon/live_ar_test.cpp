@@ -80,7 +80,7 @@ TEST_F(LiveArProgramTest, TheFlameStandsOnTheMarkerAndWhatIsRecordedIsAsFilmed) 
   take.set_name("take");
   take.set_unlocked(true);
   ASSERT_TRUE(engine_->record(take).ok());
-  const auto seen = pictures(8, v1::ArStatus::FOUND);
+  const auto seen = pictures(40, v1::ArStatus::FOUND);
   ASSERT_GE(seen.size(), 8U);
   double least = 1e9;
   double most = 0;

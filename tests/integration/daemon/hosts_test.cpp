@@ -193,7 +193,8 @@ TEST_F(Hosts, OneThatIsCutOffRecordsOnAndTheSessionIsWholeAfterwards) {
 
 TEST_F(Hosts, OneThatIsKilledHasWhatItHadAndTheLeaderSaysSo) {
   ASSERT_NO_FATAL_FAILURE(begin(1));
-  std::jthread recording([this] { static_cast<void>(leader_->client("record take --unlocked --seconds 8")); });
+  std::jthread recording(
+      [this] { static_cast<void>(leader_->client("record take --unlocked --seconds 8")); });
   ASSERT_TRUE(leader_->answers("status", "recording  take"));
   std::this_thread::sleep_for(std::chrono::seconds(3));
   others_[0]->kill();

@@ -11,8 +11,8 @@
 #include "tests/integration/cost/program/measured.h"
 #include "tests/support/march_case.h"
 
-/// Stands before libhwy's, which runs when the library is loaded and by an instruction that valgrind does not know
-/// on each machine (rdtscp). Nothing here measures time.
+/// Stands before libhwy's, which runs when the library is loaded and by an instruction that valgrind does not
+/// know on each machine (rdtscp). Nothing here measures time.
 namespace hwy::platform {
 std::uint64_t TimerResolution();
 std::uint64_t TimerResolution() { return 1; }

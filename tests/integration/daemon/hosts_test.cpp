@@ -115,7 +115,7 @@ TEST_F(Hosts, TwoAreLockedByOneStrobeAndRecordOneSession) {
   EXPECT_EQ(part.state(), v1::HostPart::WHOLE) << part.why();
   EXPECT_EQ(part.host(), others_[0]->address());
   EXPECT_EQ(part.lost(), 0U);
-  EXPECT_GE(part.frames(), 2 * 48U - 4);
+  EXPECT_NEAR(static_cast<double>(part.frames()), 2 * 48, 4);
   ASSERT_GE(part.clock_size(), 2);
   EXPECT_NEAR(1e-9 * static_cast<double>(part.clock(0).ahead_ns()), 1000, 0.02);
   const v1::Manifest there = manifest(*others_[0], "take");
@@ -187,7 +187,7 @@ TEST_F(Hosts, OneThatIsCutOffRecordsOnAndTheSessionIsWholeAfterwards) {
   const v1::Manifest whole = manifest(*leader_, "take");
   for (const v1::HostPart& part : whole.hosts()) {
     EXPECT_EQ(part.lost(), 0U) << part.host();
-    EXPECT_GE(part.frames(), 20 * 48U - 10) << part.host() << ": a busy machine may end it late, never early";
+    EXPECT_NEAR(static_cast<double>(part.frames()), 20 * 48, 10) << part.host();
   }
 }
 

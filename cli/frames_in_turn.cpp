@@ -37,6 +37,7 @@ using report::SequenceFrame;
 using report::SequenceTold;
 
 constexpr const char* kTold = "frames.json";
+constexpr double kShareOfTelling = 0.05;  ///< at most, of the time that all takes
 
 std::size_t failed(const SequenceTold& told) {
   return static_cast<std::size_t>(std::count_if(told.frames.begin(), told.frames.end(),
@@ -67,6 +68,15 @@ class FramesInTurn {
     EMBERLOCK_ASSIGN_OR_RETURN(const MadeFolders parents, MadeFolders::create(fs::absolute(out_, ec)));
     EMBERLOCK_RETURN_IF_ERROR(OutputFolder::check(request()));
     EMBERLOCK_RETURN_IF_ERROR(take_up());
+    const Status worked = work();
+    const Status written = untold_ ? write() : Status();
+    if (!worked) return worked.error();
+    if (!written) return written.error();
+    return told_;
+  }
+
+ private:
+  Status work() {
     for (; at_ < frames_.size() && !watch_.stop() && !hopeless(); ++at_) {
       const bool tried = at_ < told_.frames.size();
       if (tried && told_.frames[at_].error.empty())
@@ -75,13 +85,13 @@ class FramesInTurn {
       watch_.say(label() + (tried ? ", which failed before" : ""));
       EMBERLOCK_ASSIGN_OR_RETURN(const std::optional<Status> done, reconstruct(frames_[at_]));
       if (!done) break;  // ended early: half a frame is none, and done again
-      EMBERLOCK_RETURN_IF_ERROR(write());
       if (!done->ok()) watch_.say(fmt::format("emberlock: {}: {}", label(), done->error().message()));
+      untold_ = true;
+      if (clock_.now() >= write_again_) EMBERLOCK_RETURN_IF_ERROR(write());
     }
-    return told_;
+    return {};
   }
 
- private:
   [[nodiscard]] fs::path folder_of(std::uint64_t frame) const {
     return out_ / fmt::format("frame-{}", frame);
   }
@@ -273,14 +283,21 @@ class FramesInTurn {
 
   // --- what is told of all
 
-  [[nodiscard]] Status write() const {
+  /// Of all frames anew: where they are many it waits for its share of the time. A run that is killed does
+  /// again what wasn't told.
+  Status write() {
+    const TimePoint begin = clock_.now();
     EMBERLOCK_ASSIGN_OR_RETURN(OutputFolder staging, OutputFolder::create(request()));
     EMBERLOCK_RETURN_IF_ERROR(write_file_atomically(staging.path() / kTold, report::sequence_json(told_)));
     EMBERLOCK_RETURN_IF_ERROR(
         write_file_atomically(staging.path() / "frames.csv", report::sequence_csv(told_)));
     EMBERLOCK_RETURN_IF_ERROR(write_file_atomically(staging.path() / "report.html",
                                                     report::sequence_html(told_, arguments_.input)));
-    return staging.commit();
+    EMBERLOCK_RETURN_IF_ERROR(staging.commit());
+    untold_ = false;
+    const TimePoint end = clock_.now();
+    write_again_ = end + (end - begin) * (1 / kShareOfTelling);
+    return {};
   }
 
   /// OUT/volume_NNNN.vdb, as programs open a sequence.
@@ -306,6 +323,8 @@ class FramesInTurn {
   std::optional<std::uint64_t> deciding_;  ///< the one that sequence_ has its decisions of
   SequenceTold told_;                      ///< from at_ on, of an earlier run
   std::size_t at_ = 0;                     ///< the frame that is looked at, of frames_
+  bool untold_ = false;                    ///< told_ holds what isn't written
+  TimePoint write_again_{};                ///< not before
 };
 
 Status conclude(const SequenceTold& told, std::size_t frames, const fs::path& out) {

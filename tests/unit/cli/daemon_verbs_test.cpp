@@ -1,13 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-// The verbs that ask emberlockd, against a real server on a socket and a daemon without devices.
-#include <atomic>
+// The verbs that ask emberlockd: what goes for all, and those that only look or set.
+#include "tests/support/daemon_verbs.h"
+
 #include <chrono>
-#include <csignal>
-#include <fstream>
 #include <functional>
-#include <memory>
 #include <string>
 #include <thread>
+#include <utility>
 #include <vector>
 
 #include <gmock/gmock.h>
@@ -16,70 +15,16 @@
 #include "base/clock.h"
 #include "cli/client.h"
 #include "cli/commands.h"
-#include "cli/daemon_words.h"
-#include "daemon/server/grpc_server.h"
-#include "tests/support/fake_api.h"
-#include "tests/support/recording.h"
-#include "tests/support/verb.h"
 
 namespace emberlock::cli {
 namespace {
 using nlohmann::json;
-using testing::AllOf;
+using test::status_in;
 using testing::ElementsAre;
 using testing::HasSubstr;
 using testing::Not;
 
-v1::DaemonStatus status_in(v1::Phase phase, v1::Light light = v1::GREEN, const std::string& reason = "") {
-  v1::DaemonStatus status;
-  status.set_phase(phase);
-  status.set_light(light);
-  status.set_reason(reason);
-  status.set_rig("bench");
-  return status;
-}
-
-class DaemonVerbs : public testing::Test {
- protected:
-  DaemonVerbs() {
-    api_.board().show(status_in(v1::IDLE));
-    daemon::GrpcServerOptions options;
-    options.socket = folder_ / "socket";
-    options.sessions = sessions_;
-    auto server = daemon::GrpcServer::start(api_, options);
-    if (!server) throw std::runtime_error(server.error().message());
-    server_ = std::move(*server);
-  }
-  ~DaemonVerbs() override {
-    for (std::thread& thread : threads_) thread.join();
-  }
-
-  test::VerbRun run(void (*add)(CLI::App&), std::vector<std::string> words) const {
-    words.insert(words.end(), {"--daemon", "unix:" + (folder_ / "socket").string()});
-    return test::run_verb(add, std::move(words));
-  }
-  /// In a while, as a daemon's engine does it: each step a tenth of a second after the one before.
-  void soon(std::vector<std::function<void()>> steps) {
-    threads_.emplace_back([steps = std::move(steps)] {
-      for (const auto& step : steps) {
-        std::this_thread::sleep_for(std::chrono::milliseconds(150));
-        step();
-      }
-    });
-  }
-  void show_soon(std::vector<v1::DaemonStatus> statuses) {
-    std::vector<std::function<void()>> steps;
-    for (v1::DaemonStatus& status : statuses)
-      steps.emplace_back([this, status = std::move(status)] { api_.board().show(status); });
-    soon(std::move(steps));
-  }
-
-  test::TempFolder folder_;
-  test::FakeApi api_;
-  std::shared_ptr<daemon::ConsoleSessions> sessions_ = std::make_shared<daemon::ConsoleSessions>();
-  std::unique_ptr<daemon::GrpcServer> server_;
-  std::vector<std::thread> threads_;
-};
+using DaemonVerbs = test::VerbsOfADaemon;
 
 TEST(DaemonVerbsAlone, WithoutADaemonTheySayWhatToDoAndLeaveWithThree) {
   const test::TempFolder folder;
@@ -225,155 +170,6 @@ TEST_F(DaemonVerbs, AStatusThatIsRedIsTheExitCodeToo) {
   EXPECT_THAT(api_.calls(), ElementsAre(HasSubstr("acknowledge")));
 }
 
-TEST_F(DaemonVerbs, AlignShowsItsRoundsUntilItIsLocked) {
-  api_.board().show(status_in(v1::LOCKED, v1::GREEN, "of yesterday"));
-  v1::DaemonStatus round = status_in(v1::ALIGNING);
-  round.mutable_alignment()->set_round(1);
-  round.mutable_alignment()->set_reason("cam3 is to be reset");
-  round.set_next_step("Reset cam3.");
-  v1::DaemonStatus second = round;
-  second.mutable_alignment()->set_round(2);
-  v1::DaemonStatus locked = second;
-  locked.set_phase(v1::LOCKED);
-  locked.set_reason("All within 40 rows.");
-  api_.on_align = [&](const v1::AlignRequest&) {
-    show_soon({round, second, locked});
-    return Status();
-  };
-  const test::VerbRun result = run(add_align, {"align", "--tolerance", "50rows"});
-  EXPECT_EQ(result.exit_code, 0) << result.err;
-  EXPECT_THAT(result.out, HasSubstr("round 1: cam3 is to be reset"));
-  EXPECT_THAT(result.out, HasSubstr("next: Reset cam3."));
-  EXPECT_THAT(result.out, HasSubstr("round 2"));
-  EXPECT_THAT(result.out, HasSubstr("locked: All within 40 rows."));
-  EXPECT_THAT(api_.calls(), ElementsAre("align tolerance: \"50rows\""));
-}
-
-TEST_F(DaemonVerbs, AnAlignmentThatIsRefusedSaysWhatCouldBeMet) {
-  v1::DaemonStatus refused = status_in(v1::IDLE, v1::AMBER, "would take 900 resets");
-  refused.mutable_alignment()->set_verdict(v1::AlignmentStatus::REFUSED);
-  v1::AlignmentOffer& offer = *refused.mutable_alignment()->add_offers();
-  offer.set_policy("timed");
-  offer.set_tolerance_rows(200);
-  offer.set_tolerance_s(10.8e-3);
-  api_.on_align = [&](const v1::AlignRequest&) {
-    show_soon({status_in(v1::ALIGNING), refused});
-    return Status();
-  };
-  const test::VerbRun result = run(add_align, {"align"});
-  EXPECT_EQ(result.exit_code, 1);
-  EXPECT_THAT(result.out, HasSubstr("900 resets"));
-  EXPECT_THAT(result.out, HasSubstr("10.80 ms (200 rows) with policy timed"));
-}
-
-TEST_F(DaemonVerbs, AlignStopLetsTheLockGo) {
-  EXPECT_EQ(run(add_align, {"align", "--stop"}).exit_code, 0);
-  EXPECT_THAT(api_.calls(), ElementsAre("stop_sync"));
-}
-
-v1::DaemonStatus recording(v1::RecordingStatus::State state, std::uint64_t frames) {
-  v1::DaemonStatus status = status_in(v1::CAPTURING);
-  status.mutable_recording()->set_session("candle");
-  status.mutable_recording()->set_state(state);
-  status.mutable_recording()->set_frames(frames);
-  if (state != v1::RecordingStatus::RECORDING) status.mutable_recording()->set_verdict("The books agree.");
-  return status;
-}
-
-TEST_F(DaemonVerbs, RecordFollowsToTheVerdict) {
-  api_.on_record = [&](const v1::RecordRequest&) {
-    show_soon({recording(v1::RecordingStatus::RECORDING, 24), recording(v1::RecordingStatus::COMPLETE, 48)});
-    return Result<v1::RecordingStatus>(recording(v1::RecordingStatus::RECORDING, 0).recording());
-  };
-  const test::VerbRun result = run(add_record, {"record", "candle", "--seconds", "2", "--reconstruct"});
-  EXPECT_EQ(result.exit_code, 0) << result.err;
-  EXPECT_THAT(result.out, HasSubstr("24 frames"));
-  EXPECT_THAT(result.out, HasSubstr("48 frames recorded, none lost"));
-  EXPECT_THAT(result.out, HasSubstr("The books agree."));
-  EXPECT_THAT(api_.calls().front(), HasSubstr("name: \"candle\""));
-  EXPECT_THAT(api_.calls().front(), HasSubstr("seconds: 2"));
-  EXPECT_THAT(api_.calls().front(), HasSubstr("reconstruct: true"));
-}
-
-TEST_F(DaemonVerbs, LiveVolumesAreAskedForWithTheRecordingAndToldBesideIt) {
-  v1::RecordRequest asked;
-  api_.on_record = [&](const v1::RecordRequest& request) {
-    asked = request;
-    v1::DaemonStatus running = recording(v1::RecordingStatus::RECORDING, 240);
-    running.set_now_ns(5'000'000'000);
-    v1::LiveStatus& live = *running.mutable_live();
-    live.set_session("candle");
-    live.set_state(v1::LiveStatus::RUNNING);
-    live.set_frame(120);
-    live.set_filmed_ns(4'100'000'000);
-    live.set_takes_s(0.41);
-    live.set_voxels(48);
-    live.set_volumes(11);
-    live.set_skipped(109);
-    live.set_device("cuda");
-    show_soon({running, recording(v1::RecordingStatus::COMPLETE, 480)});
-    return Result<v1::RecordingStatus>(recording(v1::RecordingStatus::RECORDING, 0).recording());
-  };
-  const test::VerbRun result =
-      run(add_record, {"record", "candle", "--live", "--every", "12", "--voxels", "48"});
-  EXPECT_EQ(result.exit_code, 0) << result.err;
-  EXPECT_EQ(asked.live().every(), 12U);
-  EXPECT_EQ(asked.live().voxels(), 48U);
-  EXPECT_THAT(result.out, HasSubstr("; live: frame 120, 0.9 s ago, 48 voxels, 0.41 s a volume, 11 shown, 109 "
-                                    "skipped, on cuda"));
-  EXPECT_NE(run(add_record, {"record", "candle", "--every", "12"}).exit_code, 0) << "without --live";
-}
-
-TEST(LiveWords, SayWhatIsShownAndWhyNothingIs) {
-  v1::LiveStatus live;
-  live.set_state(v1::LiveStatus::STARTING);
-  EXPECT_EQ(live_line(live, 0), "starting");
-  live.set_state(v1::LiveStatus::ENDED);
-  live.set_frame(7);
-  live.set_delay_s(0.5);
-  live.set_voxels(32);
-  live.set_takes_s(0.25);
-  EXPECT_EQ(live_line(live, 0), "ended, frame 7, 0.5 s after it was filmed, 32 voxels, 0.25 s a volume");
-  live.set_state(v1::LiveStatus::STOPPED);
-  live.set_reason("Stopped.");
-  EXPECT_THAT(live_line(live, 0), testing::EndsWith(". Stopped."));
-  v1::IterationPreview preview;
-  preview.set_reconstruction("take 1 live");
-  preview.set_frame(120);
-  preview.set_live_delay_s(0.9);
-  preview.mutable_iteration()->set_seconds(0.41);
-  EXPECT_EQ(live_preview_line(preview), "take 1 live: frame 120, 0.9 s after it was filmed, 0.41 s a volume");
-}
-
-TEST_F(DaemonVerbs, ARecordingWhoseCountsDoNotAgreeIsAFailure) {
-  api_.on_record = [&](const v1::RecordRequest&) {
-    v1::DaemonStatus failed = recording(v1::RecordingStatus::FAILED, 47);
-    failed.mutable_recording()->mutable_lost()->set_queue(1);
-    show_soon({failed});
-    return Result<v1::RecordingStatus>(recording(v1::RecordingStatus::RECORDING, 0).recording());
-  };
-  const test::VerbRun result = run(add_record, {"record", "candle", "--json"});
-  EXPECT_EQ(result.exit_code, 1);
-  EXPECT_EQ(
-      json::parse(result.out.substr(result.out.rfind('\n', result.out.size() - 2) + 1))["lost"]["queue"],
-      "1");
-}
-
-TEST_F(DaemonVerbs, CtrlCEndsTheRecordingAndWaitsUntilItIsFinished) {
-  api_.on_record = [&](const v1::RecordRequest&) {
-    soon(
-        {[&] { api_.board().show(recording(v1::RecordingStatus::RECORDING, 24)); }, [] { ::raise(SIGINT); }});
-    return Result<v1::RecordingStatus>(recording(v1::RecordingStatus::RECORDING, 0).recording());
-  };
-  api_.on_stop_recording = [&] {
-    return Result<v1::RecordingStatus>(recording(v1::RecordingStatus::COMPLETE, 30).recording());
-  };
-  const test::VerbRun result = run(add_record, {"record", "candle"});
-  EXPECT_EQ(result.exit_code, 0) << result.err;
-  EXPECT_THAT(result.out, HasSubstr("30 frames"));
-  EXPECT_EQ(api_.calls().back(), "stop_recording");
-}
-
 TEST_F(DaemonVerbs, ARefusalIsToldInTheDaemonsWords) {
   api_.on_record = [](const v1::RecordRequest&) {
     return Result<v1::RecordingStatus>(
@@ -463,155 +259,6 @@ TEST_F(DaemonVerbs, StrobeChangesWhatItIsToldAlone) {
       run(add_strobe, {"strobe", "--frame-code", "--play", "--rate", "24.2", "--code-words", "2"});
   EXPECT_THAT(played.out,
               testing::AllOf(HasSubstr("flashing"), HasSubstr("24.2 Hz"), HasSubstr("... (240 flashes, ")));
-}
-
-v1::DaemonStatus reconstructing(v1::ReconstructionStatus::State state, int iterations) {
-  v1::DaemonStatus status = status_in(v1::IDLE);
-  v1::ReconstructionStatus& reconstruction = *status.mutable_reconstruction();
-  reconstruction.set_id("candle 1");
-  reconstruction.set_session("candle");
-  reconstruction.set_state(state);
-  for (int i = 1; i <= iterations; ++i) {
-    v1::Iteration& iteration = *reconstruction.add_iterations();
-    iteration.set_iteration(static_cast<std::uint32_t>(i));
-    iteration.set_seconds(i);
-  }
-  if (state == v1::ReconstructionStatus::DONE) reconstruction.set_result("/results/candle");
-  if (state == v1::ReconstructionStatus::FAILED)
-    reconstruction.set_error("it crashed by SIGSEGV. Try device cpu");
-  return status;
-}
-
-TEST_F(DaemonVerbs, ReconstructShowsEveryIterationAndTheResult) {
-  api_.on_reconstruct = [&](const v1::ReconstructRequest&) {
-    show_soon({reconstructing(v1::ReconstructionStatus::RUNNING, 1),
-               reconstructing(v1::ReconstructionStatus::RUNNING, 3),
-               reconstructing(v1::ReconstructionStatus::DONE, 4)});
-    return Result<v1::ReconstructionStatus>(
-        reconstructing(v1::ReconstructionStatus::RUNNING, 0).reconstruction());
-  };
-  const test::VerbRun result =
-      run(add_reconstruct, {"reconstruct", "candle", "--voxels", "64", "--hold-out", "1,3"});
-  EXPECT_EQ(result.exit_code, 0) << result.err;
-  for (const char* line : {"iteration 1:", "iteration 2:", "iteration 3:", "iteration 4:", "/results/candle"})
-    EXPECT_THAT(result.out, HasSubstr(line));
-  EXPECT_THAT(api_.calls(),
-              ElementsAre("reconstruct session: \"candle\" voxels: 64 hold_out: 1 hold_out: 3"));
-}
-
-TEST_F(DaemonVerbs, ReconstructAsksForTemperaturesWithTheResponseItself) {
-  const test::TempFolder folder;
-  std::ofstream(folder / "response.json")
-      << R"({"unit": "relative", "wavelength_nm": [500, 600], "r": [0, 1], "g": [1, 0], "b": [0, 0]})";
-  api_.on_reconstruct = [&](const v1::ReconstructRequest&) {
-    v1::DaemonStatus done = reconstructing(v1::ReconstructionStatus::DONE, 1);
-    done.mutable_reconstruction()->add_temperature("1650 K on average");
-    show_soon({done});
-    return Result<v1::ReconstructionStatus>(
-        reconstructing(v1::ReconstructionStatus::RUNNING, 0).reconstruction());
-  };
-  const std::string file = (folder / "response.json").string();
-  const test::VerbRun result =
-      run(add_reconstruct, {"reconstruct", "candle", "--quantity", "temperature", "--emitter", "soot",
-                            "--lines", "auto", "--response", file});
-  EXPECT_EQ(result.exit_code, 0) << result.err;
-  EXPECT_THAT(result.out, HasSubstr("1650 K on average"));
-  EXPECT_THAT(api_.calls(),
-              ElementsAre(AllOf(HasSubstr("quantity: \"temperature\""), HasSubstr("wavelength_nm: 600"),
-                                HasSubstr("emitter: \"soot\""), HasSubstr("lines: \"auto\""))));
-  EXPECT_EQ(run(add_reconstruct, {"reconstruct", "candle", "--errors"}).exit_code, 0);
-  EXPECT_THAT(api_.calls().back(), HasSubstr("errors: true"));
-  const test::VerbRun refused = run(add_reconstruct, {"reconstruct", "candle", "--quantity", "temperature",
-                                                      "--response", (folder / "no.json").string()});
-  EXPECT_EQ(refused.exit_code, 2);
-  EXPECT_THAT(refused.err, HasSubstr("no.json"));
-  EXPECT_EQ(api_.calls().size(), 2U) << "the daemon isn't asked";
-}
-
-TEST_F(DaemonVerbs, ASequenceIsToldFrameByFrame) {
-  using State = v1::ReconstructionStatus;
-  const auto at = [](State::State whole, std::initializer_list<State::State> frames) {
-    v1::DaemonStatus status = reconstructing(whole, 2);
-    std::uint64_t number = 10;
-    for (const State::State state : frames) {
-      v1::SequenceFrame& frame = *status.mutable_reconstruction()->add_frames();
-      frame.set_frame(number += 2);
-      frame.set_state(state);
-      frame.set_input_rmse(4.5);
-      if (state == State::FAILED) frame.set_error("No light.");
-    }
-    return status;
-  };
-  api_.on_reconstruct = [&](const v1::ReconstructRequest&) {
-    show_soon({at(State::RUNNING, {State::DONE, State::RUNNING, State::STATE_UNSPECIFIED}),
-               at(State::FAILED, {State::DONE, State::FAILED, State::DONE})});
-    return Result<v1::ReconstructionStatus>(at(State::RUNNING, {}).reconstruction());
-  };
-  const test::VerbRun result =
-      run(add_reconstruct, {"reconstruct", "candle", "--frame", "12", "--last-frame", "16", "--every", "2"});
-  EXPECT_EQ(result.exit_code, 1);
-  EXPECT_EQ(result.out,
-            "1 of 3: frame 12: done, input error 4.50 grey levels\n"
-            "2 of 3: frame 14: failed. No light.\n"
-            "3 of 3: frame 16: done, input error 4.50 grey levels\n");
-  EXPECT_THAT(api_.calls(), ElementsAre("reconstruct session: \"candle\" frame: 12 last_frame: 16 every: 2"));
-  EXPECT_THAT(run(add_status, {"status"}).out, HasSubstr("candle: failed"));
-}
-
-TEST_F(DaemonVerbs, AReconstructionThatFailedSaysWhy) {
-  api_.on_reconstruct = [&](const v1::ReconstructRequest&) {
-    show_soon({reconstructing(v1::ReconstructionStatus::FAILED, 1)});
-    return Result<v1::ReconstructionStatus>(
-        reconstructing(v1::ReconstructionStatus::RUNNING, 0).reconstruction());
-  };
-  const test::VerbRun result = run(add_reconstruct, {"reconstruct", "candle", "--json"});
-  EXPECT_EQ(result.exit_code, 1);
-  EXPECT_THAT(result.err, HasSubstr("SIGSEGV"));
-}
-
-TEST_F(DaemonVerbs, ATakeThatIsLongerThanTheLockRenewsItFirstAndSaysSo) {
-  const auto locked = [](double left, v1::Phase phase = v1::LOCKED) {
-    v1::DaemonStatus status = status_in(phase);
-    status.mutable_alignment()->set_verdict(v1::AlignmentStatus::ALIGNED);
-    status.mutable_alignment()->set_time_left_s(left);
-    if (left < 20) status.mutable_alignment()->set_renewed_left_s(95);
-    return status;
-  };
-  api_.board().show(locked(8.6));
-  api_.on_align = [&](const v1::AlignRequest&) {
-    api_.board().show(locked(8.5, v1::ALIGNING));
-    show_soon({locked(95)});
-    return Status();
-  };
-  api_.on_record = [&](const v1::RecordRequest&) {
-    show_soon({recording(v1::RecordingStatus::COMPLETE, 48)});
-    return Result<v1::RecordingStatus>(recording(v1::RecordingStatus::RECORDING, 0).recording());
-  };
-  const test::VerbRun result = run(add_record, {"record", "candle", "--seconds", "20"});
-  EXPECT_EQ(result.exit_code, 0) << result.err;
-  EXPECT_THAT(api_.calls(),
-              ElementsAre("align renew: true hold_s: 20", HasSubstr("record name: \"candle\"")));
-  EXPECT_THAT(result.err,
-              HasSubstr("The lock surely holds for 8.6 s, and 20 s are asked for: renewing it first."));
-  EXPECT_THAT(result.err, HasSubstr("Renewed: a take may be 95 s long."));
-}
-
-TEST_F(DaemonVerbs, NoLockIsRenewedForATakeThatItHoldsForOrThatIsAskedForAsItIs) {
-  v1::DaemonStatus status = status_in(v1::LOCKED);
-  status.mutable_alignment()->set_verdict(v1::AlignmentStatus::ALIGNED);
-  status.mutable_alignment()->set_time_left_s(30);
-  api_.board().show(status);
-  api_.on_record = [&](const v1::RecordRequest&) {
-    show_soon({recording(v1::RecordingStatus::COMPLETE, 48)});
-    return Result<v1::RecordingStatus>(recording(v1::RecordingStatus::RECORDING, 0).recording());
-  };
-  for (const auto& words :
-       std::vector<std::vector<std::string>>{{"record", "candle", "--seconds", "20"},
-                                             {"record", "candle", "--seconds", "40"},
-                                             {"record", "candle", "--seconds", "40", "--unlocked"},
-                                             {"record", "candle", "--seconds", "40", "--no-renewal"}})
-    run(add_record, words);
-  for (const std::string& call : api_.calls()) EXPECT_THAT(call, HasSubstr("record"));
 }
 
 }  // namespace

@@ -19,8 +19,8 @@
 
 namespace emberlock::test {
 
-
-inline v1::DaemonStatus status_in(v1::Phase phase, v1::Light light = v1::GREEN, const std::string& reason = "") {
+inline v1::DaemonStatus status_in(v1::Phase phase, v1::Light light = v1::GREEN,
+                                  const std::string& reason = "") {
   v1::DaemonStatus status;
   status.set_phase(phase);
   status.set_light(light);

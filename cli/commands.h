@@ -32,7 +32,7 @@ void add_ar_live(CLI::App& app);
 void add_reconstruct_live(CLI::App& app);
 void add_export(CLI::App& app);
 void add_tradeoff(CLI::App& app);
-/// `evaluate paper`.
+/// `evaluate paper`, which starts emberlock-paper.
 void add_evaluate(CLI::App& app);
 /// `tradeoff sync`; `parent` is the verb tradeoff.
 void add_tradeoff_sync(CLI::App& parent);

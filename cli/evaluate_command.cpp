@@ -1,96 +1,51 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <cstdio>
+#include <cerrno>
 #include <filesystem>
-#include <memory>
 #include <string>
+#include <system_error>
+#include <vector>
 
-#include <fmt/ranges.h>
+#include <unistd.h>
 
-#include "base/clock.h"
 #include "cli/commands.h"
-#include "cli/interrupt.h"
-#include "cli/machine.h"
-#include "evaluate/methods.h"
-#include "evaluate/paper/evaluate_paper.h"
-#include "evaluate/paper/run_file.h"
-#include "report/paper_report.h"
 
 namespace emberlock::cli {
 namespace {
+namespace fs = std::filesystem;
 
-struct EvaluateArguments {
-  evaluate::PaperOptions options;
-  std::string out;
-  std::string device = "auto";
-  bool quick = false;
-};
+constexpr const char* kPaperProgram = "emberlock-paper";
 
-void evaluate_the_paper(const EvaluateArguments& arguments) {
-  evaluate::PaperOptions options = arguments.options;
-  if (arguments.quick) options.extent = evaluate::Extent::quick;
-  options.compute.device = or_fail(recon::parse_device(arguments.device));
-  options.machine = machine(options.compute.threads, arguments.device);
-  const std::filesystem::path out = arguments.out;
-  const OutputRequest report{out / "report", evaluate::kEvaluatePaper};
-  or_fail(OutputFolder::check(report));
-  const Interrupt interrupt;
-  const SteadyClock clock;
-  const Progress progress = progress_bar("evaluate");
-  const evaluate::PaperEvaluation done =
-      or_fail(evaluate::evaluate_paper(options, out, clock, [&](double fraction, std::string_view what) {
-        tell(progress, fraction, what);
-        return !Interrupt::asked();
-      }));
-  or_fail(report::write_paper_report(done, report));
-  for (const std::string& line : report::paper_words(done)) std::printf("%s\n", line.c_str());
-  for (const evaluate::MethodRun& run : done.runs)
-    if (!run.failed.empty())
-      std::printf("%s, %s: %s\n", run.of.c_str(), run.method.c_str(), run.failed.c_str());
-  std::printf("written to %s\n", (report.target / "index.html").c_str());
-}
-
-std::string names_of_protocols() {
-  std::vector<std::string_view> names;
-  for (const evaluate::Protocol& p : evaluate::protocols(evaluate::Extent::full)) names.push_back(p.name);
-  return fmt::format("{}", fmt::join(names, ", "));
-}
-std::string names_of_methods() {
-  std::vector<std::string_view> names;
-  for (const evaluate::Method& m : evaluate::methods()) names.push_back(m.facts.name);
-  return fmt::format("{}", fmt::join(names, ", "));
+/// Replaces this process with the paper's program. That program is built on request, so this one doesn't link
+/// it. The search goes through this program's folder (libexec/emberlock), bin/ next to it, and PATH.
+[[noreturn]] void start_paper_program(std::vector<std::string> words) {
+  words.insert(words.begin(), kPaperProgram);
+  std::vector<char*> argv;
+  for (std::string& word : words) argv.push_back(word.data());
+  argv.push_back(nullptr);
+  std::error_code unread;
+  const fs::path folder = fs::read_symlink("/proc/self/exe", unread).parent_path();
+  for (const fs::path& place : {folder, folder.parent_path().parent_path() / "bin"})
+    if (const fs::path program = place / kPaperProgram; ::access(program.c_str(), X_OK) == 0)
+      ::execv(program.c_str(), argv.data());
+  ::execvp(kPaperProgram, argv.data());
+  const std::string what = errno == ENOENT ? "this program isn't installed"
+                                           : "can't be started: " + std::generic_category().message(errno);
+  fail({ErrorKind::refused, what, kPaperProgram,
+        "build it with `scripts/build release emberlock-paper`, then put it on PATH or next to emberlock"});
 }
 
 }  // namespace
 
 void add_evaluate(CLI::App& app) {
-  auto arguments = std::make_shared<EvaluateArguments>();
-  EvaluateArguments& a = *arguments;
   CLI::App* verb = app.add_subcommand("evaluate", "Compares methods on flames with known truth");
   verb->require_subcommand(1);
-  CLI::App* paper = verb->add_subcommand(
-      "paper", "The paper's tables and figures again, with every method on the same pictures");
-  paper
-      ->add_option("--out", a.out,
-                   "Folder for report/, runs/ and truth/; one that was begun with the same settings goes on")
-      ->required();
-  paper->add_flag("--quick", a.quick, "Small pictures and few cameras: a minute instead of half an hour");
-  paper->add_option("--only", a.options.only, "Some of the tables: " + names_of_protocols())->delimiter(',');
-  paper->add_option("--methods", a.options.methods, "Some of the methods: " + names_of_methods())
-      ->delimiter(',');
-  paper->add_option("--cells", a.options.cells,
-                    "Of the simulated gas along each edge, a multiple of 32 [192; quick: 64]");
-  paper->add_option("--voxels", a.options.voxels, "Of every reconstruction along an edge [128; quick: 48]");
-  paper->add_option("--seed", a.options.seed, "Of what is random: noise, methods")->capture_default_str();
-  paper
-      ->add_option(
-          "--device", a.device,
-          "auto: the CPU, and where there is a GPU the paper's method and ours there too; cpu: no GPU; cuda: "
-          "it must be there")
-      ->capture_default_str();
-  paper->add_option("--threads", a.options.compute.threads, "CPU threads; 0: one per core")
-      ->check(CLI::Range(0, 256))
-      ->capture_default_str();
-  paper->callback([arguments] { evaluate_the_paper(*arguments); });
+  CLI::App* paper = verb->add_subcommand("paper",
+                                         "Repeats the source paper's tables and figures; emberlock-paper, a "
+                                         "program that is built on request, takes "
+                                         "all options. `emberlock evaluate paper --help` lists them.");
+  paper->prefix_command();
+  paper->set_help_flag();
+  paper->callback([paper] { start_paper_program(paper->remaining()); });
 }
 
 }  // namespace emberlock::cli

@@ -12,9 +12,9 @@
 #include "base/clock.h"
 #include "base/file.h"
 #include "cli/commands.h"
-#include "cli/machine.h"
 #include "cli/outputs.h"
 #include "cli/scene_options.h"
+#include "evaluate/machine.h"
 #include "evaluate/measure_front.h"
 #include "evaluate/recon_sweep.h"
 #include "evaluate/work_points.h"
@@ -146,7 +146,7 @@ void tradeoff_recon(const SweepArguments& arguments) {
   or_fail(recon::hold_out(scene, arguments.held_out));
   SteadyClock clock;
   report::Tradeoff tradeoff{
-      arguments.input, common_options(arguments), machine(arguments.threads, arguments.device), {}};
+      arguments.input, common_options(arguments), evaluate::machine(arguments.threads, arguments.device), {}};
   tradeoff.sweep = or_fail(evaluate::sweep(scene, options, clock, progress_bar("tradeoff")));
   or_fail(report::write_tradeoff(tradeoff, where));
   print_summary(tradeoff, arguments.out);

@@ -338,8 +338,7 @@ TEST_F(OutputFolders, TheTablesHoldEveryVerbThatWritesOne) {
       "emberlock devices clips --out",    // needs a camera: tests/vm/ptp
       "emberlock batch --out",            // goes on with what is there: tests/integration/batch
       "emberlock batch submit --out",     // the same
-      "emberlock sessions backup --to",   // puts copies beside what is there: backup_test.cpp
-      "emberlock evaluate paper --out"};  // several in it: evaluate_paper_test.cpp
+      "emberlock sessions backup --to"};  // puts copies beside what is there: backup_test.cpp
   for (const std::vector<Writer>& writers : {replacing(), founding()}) {
     for (const Writer& writer : writers) {
       if (*writer.option == '\0') continue;

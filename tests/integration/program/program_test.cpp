@@ -2,6 +2,7 @@
 // bin/emberlock as it is started: what it does by itself, and how it hands on.
 #include <algorithm>
 #include <filesystem>
+#include <fstream>
 #include <string>
 
 #include <gmock/gmock.h>
@@ -52,6 +53,47 @@ TEST(Program, SaysWhatIsMissingWhereOnlyHalfOfItIsInstalled) {
 #if EMBERLOCK_WITH_DAEMON
   EXPECT_EQ(shell(half + " status --daemon unix:/nowhere").status, 3);
 #endif
+}
+
+/// `emberlock evaluate paper` in a copy of the installed programs, of which emberlock-paper is none.
+class EvaluatePaper : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    fs::create_directories(temp_ / "bin");
+    fs::create_directories(temp_ / "libexec/emberlock");
+    fs::create_directories(temp_ / "elsewhere");
+    fs::copy_file(kProgram, temp_ / "bin/emberlock");
+    const std::string verbs = "libexec/emberlock/emberlock";
+    fs::copy_file(fs::path(kProgram).parent_path().parent_path() / verbs, temp_ / verbs);
+  }
+  void write_program(const fs::path& folder) const {
+    const fs::path program = temp_ / folder / "emberlock-paper";
+    std::ofstream(program) << "#!/bin/sh\necho " << folder.string() << " \"$@\"\nexit 7\n";
+    fs::permissions(program, fs::perms::owner_all);
+  }
+  [[nodiscard]] Shell evaluate(const std::string& options) const {
+    return shell("PATH=" + (temp_ / "elsewhere").string() + ":/bin:/usr/bin " +
+                 (temp_ / "bin/emberlock").string() + " evaluate paper " + options);
+  }
+  const test::TempFolder temp_{test::TempFolder::On::disk};
+};
+
+TEST_F(EvaluatePaper, SaysHowToBuildTheProgramThatIsMissing) {
+  const Shell missing = evaluate("--out demo");
+  EXPECT_EQ(missing.status, 1);
+  EXPECT_EQ(missing.output,
+            "emberlock: emberlock-paper: this program isn't installed. Build it with `scripts/build release "
+            "emberlock-paper`, then put it on PATH or next to emberlock\n");
+}
+
+TEST_F(EvaluatePaper, HandsOptionsOverAndReturnsTheExitCode) {
+  for (const char* folder :
+       {"elsewhere", "bin", "libexec/emberlock"}) {  // each has precedence over the one before
+    write_program(folder);
+    const Shell done = evaluate("--quick --out demo --only a,b -x 'two  words' --help");
+    EXPECT_EQ(done.status, 7);
+    EXPECT_EQ(done.output, std::string(folder) + " --quick --out demo --only a,b -x two  words --help\n");
+  }
 }
 
 class Version : public ::testing::Test {

@@ -29,6 +29,9 @@ const std::map<std::string, std::set<std::string>> kMayInclude{
     {"evaluate", {"base", "smear_sync", "session", "recon"}},
     {"apply", {"base", "session", "recon"}},
     {"report", {"base", "proto", "smear_sync", "session", "recon", "rig", "films", "evaluate"}},
+    {"paper",
+     {"base", "proto", "smear_sync", "session", "drivers", "recon", "rig", "films", "evaluate", "apply",
+      "report"}},
     {"daemon", {"base", "proto", "smear_sync", "session", "drivers", "recon", "rig", "report"}},
     {"cli",
      {"base", "proto", "smear_sync", "session", "drivers", "recon", "rig", "films", "evaluate", "apply",
@@ -52,17 +55,19 @@ struct Include {
   std::string header;
 };
 
+/// Includes of the sources below a folder, of a room without its own tests (paper/tests).
 std::vector<Include> includes_below(const std::string& folder) {
   static const std::regex pattern("^\\s*#\\s*include\\s*\"([^\"]+)\"");
   std::vector<Include> found;
-  for (const auto& entry : fs::recursive_directory_iterator(kRoot / folder)) {
-    const std::string extension = entry.path().extension();
+  for (auto entry = fs::recursive_directory_iterator(kRoot / folder); entry != fs::end(entry); ++entry) {
+    if (entry->path().filename() == "tests") entry.disable_recursion_pending();
+    const std::string extension = entry->path().extension();
     if (extension != ".h" && extension != ".cpp" && extension != ".cu" && extension != ".cuh") continue;
-    std::ifstream in(entry.path());
+    std::ifstream in(entry->path());
     std::smatch match;
     for (std::string line; std::getline(in, line);) {
       if (std::regex_search(line, match, pattern))
-        found.push_back({fs::relative(entry.path(), kRoot), match[1]});
+        found.push_back({fs::relative(entry->path(), kRoot), match[1]});
     }
   }
   return found;
@@ -152,8 +157,22 @@ TEST(House, ARoomLinksOnlyWhatStandsAboveIt) {
     }
   }
   for (const char* room :
-       {"base", "smear_sync", "session", "recon", "films", "evaluate", "apply", "report", "cli"})
+       {"base", "smear_sync", "session", "recon", "films", "evaluate", "apply", "report", "paper", "cli"})
     EXPECT_TRUE(rooms.contains(room)) << room << " is not in links.txt";
+}
+
+/// paper/ is built on request, so neither a room nor a test outside of it may need it.
+TEST(House, NothingOutsideOfPaperNeedsIt) {
+  for (const auto& [file, header] : includes_below("tests"))
+    EXPECT_NE(folder_of(header), "paper") << file << " includes \"" << header << '"';
+  std::ifstream file(fs::path(EMBERLOCK_BUILD_DIR) / "links.txt");
+  int users = 0;
+  for (std::string line; std::getline(file, line);) {
+    if (line.find("emberlock::paper") == std::string::npos) continue;
+    ++users;
+    EXPECT_TRUE(line.starts_with("emberlock-paper ")) << line;
+  }
+  EXPECT_EQ(users, 1);
 }
 
 /// Headers that include each other are one in two files.
@@ -200,11 +219,11 @@ std::set<std::string> files_with(const std::vector<std::string>& folders, const 
 /// What a verb writes goes through base/output_folder.h, which alone replaces and removes. The import's
 /// unfinished work is known by its content too; a batch's ledger is renames, in a folder that it made.
 TEST(House, OnlyOutputFolderReplacesAndRemovesFolders) {
-  EXPECT_EQ(files_with({"cli", "films", "report", "recon"},
+  EXPECT_EQ(files_with({"cli", "films", "paper", "report", "recon"},
                        std::regex("remove_all\\(|\\brename\\(|\\brmdir\\(|unlink\\(")),
             (std::set<std::string>{"films/import_parts.cpp", "recon/batch/ledger.cpp"}));
   // These fill a folder that OutputFolder made.
-  EXPECT_EQ(files_with({"cli", "films", "report", "recon"}, std::regex("create_director")),
+  EXPECT_EQ(files_with({"cli", "films", "paper", "report", "recon"}, std::regex("create_director")),
             (std::set<std::string>{"report/box_pictures.cpp", "films/import_parts.cpp",
                                    "recon/calibrate/rig_formats.cpp", "recon/pipeline/reconstruct.cpp",
                                    "cli/stylize_command.cpp", "recon/batch/ledger.cpp"}));
@@ -212,7 +231,7 @@ TEST(House, OnlyOutputFolderReplacesAndRemovesFolders) {
 
 TEST(House, EveryFolderExplainsItself) {
   for (const char* folder : {"base", "proto", "smear_sync", "session", "drivers", "recon", "rig", "films",
-                             "evaluate", "apply", "report", "daemon", "cli", "tests"}) {
+                             "evaluate", "apply", "report", "paper", "daemon", "cli", "tests"}) {
     EXPECT_TRUE(fs::exists(kRoot / folder / "README.md")) << folder;
   }
 }

@@ -29,6 +29,7 @@ const std::map<std::string, std::string> kRooms{
     {"evaluate", "emberlock::evaluate"},
     {"apply", "emberlock::apply"},
     {"report", "emberlock::report"},
+    {"paper", "emberlock::paper"},
     {"daemon", "emberlock::daemon"},
     {"cli", "emberlock::cli"},
 };
@@ -42,11 +43,12 @@ struct Source {
 std::vector<Source> ship_sources() {
   std::vector<Source> sources;
   for (const auto& [room, space] : kRooms) {
-    for (const auto& entry : fs::recursive_directory_iterator(kSources / room)) {
-      const std::string extension = entry.path().extension();
+    for (auto entry = fs::recursive_directory_iterator(kSources / room); entry != fs::end(entry); ++entry) {
+      if (entry->path().filename() == "tests") entry.disable_recursion_pending();  // paper/tests
+      const std::string extension = entry->path().extension();
       if (extension != ".h" && extension != ".cpp" && extension != ".cu") continue;
-      Source source{fs::relative(entry.path(), kSources).string(), room, {}};
-      std::ifstream in(entry.path());
+      Source source{fs::relative(entry->path(), kSources).string(), room, {}};
+      std::ifstream in(entry->path());
       for (std::string line; std::getline(in, line);) source.lines.push_back(line);
       sources.push_back(std::move(source));
     }

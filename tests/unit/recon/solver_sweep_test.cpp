@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Solvers on what no renderer of ours made, in geometries and sizes that nobody chose: found, or a clear
-// error. `bench_solver_sweep` runs as many cases as it is asked for, at full size.
+// error.
 #include "tests/support/solver_sweep.h"
 
 #include <gtest/gtest.h>

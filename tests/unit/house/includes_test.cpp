@@ -55,19 +55,26 @@ struct Include {
   std::string header;
 };
 
-/// Includes of the sources below a folder, of a room without its own tests (paper/tests).
+/// The files below a room, without its own tests (paper/tests).
+std::vector<fs::path> files_below(const std::string& room) {
+  std::vector<fs::path> files;
+  for (auto entry = fs::recursive_directory_iterator(kRoot / room); entry != fs::end(entry); ++entry) {
+    if (entry->path().filename() == "tests") entry.disable_recursion_pending();
+    files.push_back(entry->path());
+  }
+  return files;
+}
+
 std::vector<Include> includes_below(const std::string& folder) {
   static const std::regex pattern("^\\s*#\\s*include\\s*\"([^\"]+)\"");
   std::vector<Include> found;
-  for (auto entry = fs::recursive_directory_iterator(kRoot / folder); entry != fs::end(entry); ++entry) {
-    if (entry->path().filename() == "tests") entry.disable_recursion_pending();
-    const std::string extension = entry->path().extension();
+  for (const fs::path& path : files_below(folder)) {
+    const std::string extension = path.extension();
     if (extension != ".h" && extension != ".cpp" && extension != ".cu" && extension != ".cuh") continue;
-    std::ifstream in(entry->path());
+    std::ifstream in(path);
     std::smatch match;
     for (std::string line; std::getline(in, line);) {
-      if (std::regex_search(line, match, pattern))
-        found.push_back({fs::relative(entry->path(), kRoot), match[1]});
+      if (std::regex_search(line, match, pattern)) found.push_back({fs::relative(path, kRoot), match[1]});
     }
   }
   return found;
@@ -206,11 +213,11 @@ TEST(House, NothingIncludesTests) {
 std::set<std::string> files_with(const std::vector<std::string>& folders, const std::regex& pattern) {
   std::set<std::string> found;
   for (const std::string& folder : folders) {
-    for (const auto& entry : fs::recursive_directory_iterator(kRoot / folder)) {
-      if (entry.path().extension() != ".cpp") continue;
-      std::ifstream in(entry.path());
+    for (const fs::path& path : files_below(folder)) {
+      if (path.extension() != ".cpp") continue;
+      std::ifstream in(path);
       const std::string text{std::istreambuf_iterator<char>(in), {}};
-      if (std::regex_search(text, pattern)) found.insert(fs::relative(entry.path(), kRoot).string());
+      if (std::regex_search(text, pattern)) found.insert(fs::relative(path, kRoot).string());
     }
   }
   return found;

@@ -36,16 +36,13 @@ constexpr const char* kPaperProgram = "emberlock-paper";
 
 }  // namespace
 
-void add_evaluate(CLI::App& app) {
-  CLI::App* verb = app.add_subcommand("evaluate", "Compares methods on flames with known truth");
-  verb->require_subcommand(1);
-  CLI::App* paper = verb->add_subcommand("paper",
-                                         "Repeats the source paper's tables and figures; emberlock-paper, a "
-                                         "program that is built on request, takes "
-                                         "all options. `emberlock evaluate paper --help` lists them.");
-  paper->prefix_command();
-  paper->set_help_flag();
-  paper->callback([paper] { start_paper_program(paper->remaining()); });
+void add_evaluate(const Verb& app) {
+  const Verb verb = app.add_verb("evaluate", "Compares methods on flames with known truth");
+  verb.require_verb();
+  verb.add_verb("paper",
+                "Repeats the source paper's tables and figures; emberlock-paper, a program that is built on "
+                "request, takes all options. `emberlock evaluate paper --help` lists them.")
+      .set_action_on_words(start_paper_program);
 }
 
 }  // namespace emberlock::cli

@@ -11,8 +11,8 @@
 #include "apply/plate_light.h"
 #include "apply/transfer.h"
 #include "base/image.h"
-#include "recon/calibrate/camera_model.h"
 #include "recon/compute/pool.h"
+#include "recon/views/camera_model.h"
 
 namespace emberlock::apply {
 

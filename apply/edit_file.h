@@ -14,7 +14,7 @@
 #include "base/image.h"
 #include "base/quantity.h"
 #include "base/result.h"
-#include "recon/preprocess/view.h"
+#include "recon/views/view.h"
 
 namespace emberlock::apply {
 

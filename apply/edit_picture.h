@@ -7,7 +7,7 @@
 
 #include "apply/edit_file.h"
 #include "base/result.h"
-#include "recon/preprocess/radiance_image.h"
+#include "recon/views/radiance_image.h"
 
 namespace emberlock::apply {
 

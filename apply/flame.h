@@ -14,13 +14,13 @@
 #include "apply/kernels/flame_table.h"
 #include "apply/placement.h"
 #include "base/result.h"
-#include "recon/calibrate/camera_model.h"
 #include "recon/compute/pool.h"
 #include "recon/hull/ray_list.h"
 #include "recon/kernels/rgba.h"
 #include "recon/pipeline/shown_volume.h"
 #include "recon/render/coarse_medium.h"
 #include "recon/render/in_scatter.h"
+#include "recon/views/camera_model.h"
 
 namespace emberlock::apply {
 

@@ -13,7 +13,7 @@
 #include "base/quantity.h"
 #include "base/result.h"
 #include "recon/calibrate/board.h"
-#include "recon/calibrate/camera_model.h"
+#include "recon/views/camera_model.h"
 
 namespace emberlock::apply {
 

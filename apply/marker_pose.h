@@ -6,7 +6,7 @@
 #include <Eigen/Core>
 
 #include "apply/marker.h"
-#include "recon/calibrate/camera_model.h"
+#include "recon/views/camera_model.h"
 
 namespace emberlock::apply {
 

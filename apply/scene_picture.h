@@ -7,10 +7,10 @@
 
 #include "apply/flame.h"
 #include "apply/surfaces.h"
-#include "recon/calibrate/camera_model.h"
 #include "recon/compute/pool.h"
 #include "recon/effects/effects.h"
-#include "recon/preprocess/radiance_image.h"
+#include "recon/views/camera_model.h"
+#include "recon/views/radiance_image.h"
 
 namespace emberlock::apply {
 

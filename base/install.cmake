@@ -3,7 +3,7 @@
 # and find_package(Emberlock COMPONENTS recon smear session). `cmake --install BUILD --component development` lays down this alone, packages
 # hold the rest.
 include(CMakePackageConfigHelpers)
-set(libraries base proto ccd_model smear_sync session recon)
+set(libraries base proto ccd_model smear_sync session recon_core recon_calibrate recon_measure recon_io recon)
 foreach(library ${libraries})
   set_target_properties(emberlock_${library} PROPERTIES EXPORT_NAME ${library})
   list(APPEND targets emberlock_${library})

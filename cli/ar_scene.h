@@ -8,7 +8,7 @@
 #include "base/image.h"
 #include "base/result.h"
 #include "emberlock/v1/session.pb.h"
-#include "recon/calibrate/camera_model.h"
+#include "recon/views/camera_model.h"
 
 namespace emberlock::cli {
 

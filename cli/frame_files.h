@@ -11,7 +11,7 @@
 #include "base/quantity.h"
 #include "base/result.h"
 #include "recon/export/exr_file.h"
-#include "recon/preprocess/radiance_image.h"
+#include "recon/views/radiance_image.h"
 #include "session/video_writer.h"
 
 namespace emberlock::cli {

@@ -12,7 +12,7 @@
 #include "cli/numbers.h"
 #include "cli/scene_options.h"
 #include "recon/pipeline/grid_choice.h"
-#include "recon/preprocess/shrink.h"
+#include "recon/views/shrink.h"
 
 namespace emberlock::cli {
 namespace {

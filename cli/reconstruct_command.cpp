@@ -28,7 +28,7 @@
 #include "recon/pipeline/scene.h"
 #include "recon/pipeline/single_run.h"
 #include "recon/pipeline/work_precision.h"
-#include "recon/preprocess/check_scene.h"
+#include "recon/views/check_scene.h"
 #include "report/box_pictures.h"
 #include "report/reconstruct_report.h"
 #include "report/volume_axes.h"

@@ -4,7 +4,7 @@
 #include <string>
 
 #include "base/result.h"
-#include "recon/calibrate/box.h"
+#include "recon/views/box.h"
 
 namespace emberlock::cli {
 

@@ -11,7 +11,7 @@
 #include "base/quantity.h"
 #include "base/result.h"
 #include "evaluate/error_law.h"
-#include "recon/calibrate/camera_model.h"
+#include "recon/views/camera_model.h"
 
 namespace emberlock::evaluate {
 

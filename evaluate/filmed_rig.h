@@ -8,7 +8,7 @@
 #include "base/clock.h"
 #include "base/result.h"
 #include "evaluate/measure_rig.h"
-#include "recon/preprocess/view.h"
+#include "recon/views/view.h"
 
 namespace emberlock::evaluate {
 

@@ -8,7 +8,7 @@
 #include "base/progress.h"
 #include "base/result.h"
 #include "recon/pipeline/reference_front.h"
-#include "recon/preprocess/view.h"
+#include "recon/views/view.h"
 
 namespace emberlock::evaluate {
 

@@ -9,7 +9,7 @@
 #include "base/progress.h"
 #include "base/result.h"
 #include "recon/pipeline/work_precision.h"
-#include "recon/preprocess/view.h"
+#include "recon/views/view.h"
 
 namespace emberlock::evaluate {
 

@@ -8,11 +8,11 @@
 #include "base/quantity.h"
 #include "base/result.h"
 #include "paper/protocol.h"
-#include "recon/calibrate/box.h"
 #include "recon/calibrate/camera_response.h"
-#include "recon/preprocess/view.h"
 #include "recon/render/volume.h"
-#include "recon/synthetic/visible_gas.h"
+#include "recon/temperature/visible_gas.h"
+#include "recon/views/box.h"
+#include "recon/views/view.h"
 
 namespace emberlock::paper {
 

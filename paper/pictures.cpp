@@ -8,7 +8,7 @@
 
 #include <fmt/format.h>
 
-#include "recon/preprocess/flame_mask.h"
+#include "recon/views/flame_mask.h"
 #include "report/flame_pictures.h"
 #include "report/inferno.h"
 

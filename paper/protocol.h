@@ -8,7 +8,7 @@
 
 #include "base/image.h"
 #include "base/result.h"
-#include "recon/preprocess/view.h"
+#include "recon/views/view.h"
 
 namespace emberlock::paper {
 

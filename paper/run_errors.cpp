@@ -5,9 +5,9 @@
 #include <cmath>
 
 #include "recon/adjust/picture_error.h"
-#include "recon/preprocess/flame_mask.h"
 #include "recon/render/at_key_points.h"
 #include "recon/render/render.h"
+#include "recon/views/flame_mask.h"
 
 namespace emberlock::paper {
 namespace {

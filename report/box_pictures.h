@@ -5,7 +5,7 @@
 #include "base/output_folder.h"
 #include "base/result.h"
 #include "recon/kernels/grid.h"
-#include "recon/preprocess/view.h"
+#include "recon/views/view.h"
 
 namespace emberlock::report {
 

@@ -8,9 +8,9 @@
 
 #include <Eigen/Core>
 
-#include "recon/calibrate/box.h"
-#include "recon/calibrate/camera_model.h"
-#include "recon/preprocess/view.h"
+#include "recon/views/box.h"
+#include "recon/views/camera_model.h"
+#include "recon/views/view.h"
 #include "report/html.h"
 
 namespace emberlock::report {

@@ -4,8 +4,8 @@
 #include <vector>
 
 #include "base/image.h"
-#include "recon/preprocess/flame_mask.h"
-#include "recon/preprocess/view.h"
+#include "recon/views/flame_mask.h"
+#include "recon/views/view.h"
 
 namespace emberlock::report {
 

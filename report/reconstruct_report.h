@@ -4,7 +4,7 @@
 #include <string>
 
 #include "recon/pipeline/reconstruct.h"
-#include "recon/preprocess/view.h"
+#include "recon/views/view.h"
 
 namespace emberlock::report {
 

@@ -11,9 +11,9 @@
 #include <Eigen/Core>
 
 #include "base/result.h"
-#include "recon/calibrate/camera_model.h"
 #include "recon/export/shared_volume.h"
-#include "recon/preprocess/view.h"
+#include "recon/views/camera_model.h"
+#include "recon/views/view.h"
 
 namespace emberlock::report {
 

@@ -6,7 +6,7 @@
 
 #include <Eigen/Core>
 
-#include "recon/preprocess/view.h"
+#include "recon/views/view.h"
 
 namespace emberlock::report {
 

@@ -11,8 +11,8 @@
 
 #include "recon/adjust/descent.h"
 #include "recon/adjust/tracker.h"
-#include "recon/preprocess/check_scene.h"
-#include "recon/preprocess/flame_mask.h"
+#include "recon/views/check_scene.h"
+#include "recon/views/flame_mask.h"
 
 namespace emberlock::paper {
 namespace {

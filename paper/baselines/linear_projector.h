@@ -12,9 +12,9 @@
 #include "recon/effects/refraction.h"
 #include "recon/hull/hull.h"
 #include "recon/kernels/rgba.h"
-#include "recon/preprocess/view.h"
 #include "recon/render/march_table.h"
 #include "recon/render/volume.h"
+#include "recon/views/view.h"
 
 namespace emberlock::paper {
 

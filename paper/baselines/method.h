@@ -13,9 +13,9 @@
 #include "recon/compute/device.h"
 #include "recon/effects/effects.h"
 #include "recon/hull/hull.h"
-#include "recon/preprocess/view.h"
 #include "recon/render/volume.h"
 #include "recon/temperature/emitter.h"
+#include "recon/views/view.h"
 
 namespace emberlock::paper {
 

@@ -11,9 +11,9 @@
 
 #include "recon/adjust/picture_error.h"
 #include "recon/compute/pool.h"
-#include "recon/preprocess/check_scene.h"
-#include "recon/preprocess/flame_mask.h"
 #include "recon/render/render.h"
+#include "recon/views/check_scene.h"
+#include "recon/views/flame_mask.h"
 
 namespace emberlock::paper {
 namespace {

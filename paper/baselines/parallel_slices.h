@@ -12,8 +12,8 @@
 #include "base/result.h"
 #include "paper/baselines/method.h"
 #include "recon/kernels/grid.h"
-#include "recon/preprocess/view.h"
 #include "recon/render/volume.h"
+#include "recon/views/view.h"
 
 namespace emberlock::paper {
 

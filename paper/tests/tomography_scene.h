@@ -9,9 +9,9 @@
 
 #include "paper/baselines/method.h"
 #include "recon/adjust/picture_error.h"
-#include "recon/preprocess/flame_mask.h"
 #include "recon/render/render.h"
 #include "recon/synthetic/flame.h"
+#include "recon/views/flame_mask.h"
 #include "tests/support/ball_scene.h"
 
 namespace emberlock::test {

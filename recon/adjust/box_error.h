@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "recon/adjust/engine.h"
-#include "recon/preprocess/flame_mask.h"
+#include "recon/views/flame_mask.h"
 
 namespace emberlock::recon {
 

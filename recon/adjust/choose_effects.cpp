@@ -12,7 +12,7 @@
 #include "recon/adjust/left_out_views.h"
 #include "recon/adjust/predict_effects.h"
 #include "recon/effects/motion.h"
-#include "recon/preprocess/picture_clues.h"
+#include "recon/views/picture_clues.h"
 
 namespace emberlock::recon {
 namespace {

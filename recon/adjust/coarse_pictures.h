@@ -3,8 +3,8 @@
 
 #include <vector>
 
-#include "recon/preprocess/flame_mask.h"
 #include "recon/render/render.h"
+#include "recon/views/flame_mask.h"
 
 namespace emberlock::recon {
 

@@ -7,7 +7,7 @@
 #include <fmt/format.h>
 
 #include "recon/effects/background.h"
-#include "recon/preprocess/picture_clues.h"
+#include "recon/views/picture_clues.h"
 
 namespace emberlock::recon {
 namespace {

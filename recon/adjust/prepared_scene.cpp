@@ -7,7 +7,7 @@
 #include "recon/effects/background.h"
 #include "recon/effects/motion.h"
 #include "recon/effects/sensor.h"
-#include "recon/preprocess/check_scene.h"
+#include "recon/views/check_scene.h"
 
 namespace emberlock::recon {
 namespace {

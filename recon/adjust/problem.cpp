@@ -5,7 +5,7 @@
 
 #include "recon/adjust/problem_cuda.h"
 #include "recon/effects/refraction.h"
-#include "recon/preprocess/view.h"
+#include "recon/views/view.h"
 
 namespace emberlock::recon {
 namespace {

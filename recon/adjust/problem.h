@@ -12,7 +12,7 @@
 #include "recon/kernels/pictures.h"
 #include "recon/kernels/residual.h"
 #include "recon/kernels/rgba.h"
-#include "recon/preprocess/radiance_image.h"
+#include "recon/views/radiance_image.h"
 
 namespace emberlock::recon {
 

@@ -5,7 +5,7 @@
 #include "recon/compute/gpu_pictures.h"
 #include "recon/kernels/level.h"
 #include "recon/kernels/update.h"
-#include "recon/preprocess/picture_on_gpu.h"
+#include "recon/views/picture_on_gpu.h"
 
 namespace emberlock::recon {
 GpuProblem::GpuProblem(const Problem& problem) : rays(GpuRays::of(problem.list)) {

@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <utility>
 
-#include "recon/preprocess/radiance_image.h"
+#include "recon/views/radiance_image.h"
 
 namespace emberlock::recon {
 namespace {

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <limits>
 
-#include "recon/preprocess/shrink.h"
+#include "recon/views/shrink.h"
 
 namespace emberlock::recon {
 Scene small_scene(const Scene& scene, const std::vector<FlameMask>& masks, double pixels_looked_at) {

@@ -9,7 +9,7 @@
 
 #include "base/result.h"
 #include "recon/calibrate/board.h"
-#include "recon/calibrate/camera_model.h"
+#include "recon/views/camera_model.h"
 
 namespace emberlock::recon {
 

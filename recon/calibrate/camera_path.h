@@ -5,8 +5,8 @@
 #include <vector>
 
 #include "base/quantity.h"
-#include "recon/calibrate/box.h"
-#include "recon/calibrate/camera_model.h"
+#include "recon/views/box.h"
+#include "recon/views/camera_model.h"
 
 namespace emberlock::recon {
 

@@ -10,7 +10,7 @@
 #include <Eigen/Core>
 
 #include "base/image.h"
-#include "recon/calibrate/camera_model.h"
+#include "recon/views/camera_model.h"
 
 namespace emberlock::recon {
 

@@ -4,7 +4,7 @@
 #include <Eigen/Core>
 
 #include "base/result.h"
-#include "recon/calibrate/camera_model.h"
+#include "recon/views/camera_model.h"
 
 namespace emberlock::recon {
 

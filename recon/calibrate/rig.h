@@ -7,9 +7,9 @@
 #include <utility>
 #include <vector>
 
-#include "recon/calibrate/box.h"
-#include "recon/calibrate/camera_model.h"
 #include "recon/calibrate/camera_response.h"
+#include "recon/views/box.h"
+#include "recon/views/camera_model.h"
 #include "session/reader.h"
 #include "session/rig_file.h"  // read_rig, write_rig
 

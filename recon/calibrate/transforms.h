@@ -9,9 +9,9 @@
 #include <vector>
 
 #include "base/result.h"
-#include "recon/calibrate/box.h"
-#include "recon/calibrate/camera_model.h"
 #include "recon/calibrate/camera_response.h"
+#include "recon/views/box.h"
+#include "recon/views/camera_model.h"
 
 namespace emberlock::recon {
 

@@ -2,7 +2,7 @@
 #pragma once
 
 #include "recon/effects/effects.h"
-#include "recon/preprocess/view.h"
+#include "recon/views/view.h"
 
 namespace emberlock::recon {
 

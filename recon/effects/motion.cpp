@@ -6,7 +6,7 @@
 
 #include <fmt/format.h>
 
-#include "recon/preprocess/flame_mask.h"
+#include "recon/views/flame_mask.h"
 
 namespace emberlock::recon {
 namespace {

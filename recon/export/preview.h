@@ -8,10 +8,10 @@
 #include <optional>
 #include <vector>
 
-#include "recon/calibrate/box.h"
 #include "recon/kernels/grid.h"
-#include "recon/preprocess/view.h"
 #include "recon/render/volume.h"
+#include "recon/views/box.h"
+#include "recon/views/view.h"
 
 namespace emberlock::recon {
 

@@ -10,9 +10,9 @@
 #include "base/quantity.h"
 #include "recon/adjust/solver.h"
 #include "recon/effects/effects.h"
-#include "recon/preprocess/view.h"
 #include "recon/temperature/error_summary.h"
 #include "recon/temperature/temperature.h"
+#include "recon/views/view.h"
 
 namespace emberlock::recon {
 

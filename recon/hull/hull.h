@@ -6,8 +6,8 @@
 #include "base/result.h"
 #include "recon/compute/device.h"
 #include "recon/hull/medium.h"
-#include "recon/preprocess/flame_mask.h"
-#include "recon/preprocess/view.h"
+#include "recon/views/flame_mask.h"
+#include "recon/views/view.h"
 
 namespace emberlock::recon {
 

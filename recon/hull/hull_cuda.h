@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "recon/kernels/carve.h"
-#include "recon/preprocess/flame_mask.h"
+#include "recon/views/flame_mask.h"
 
 namespace emberlock::recon {
 

@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cstring>
 
-#include "recon/calibrate/camera_model.h"
+#include "recon/views/camera_model.h"
 
 namespace emberlock::recon {
 

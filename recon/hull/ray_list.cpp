@@ -9,12 +9,12 @@
 
 #include <Eigen/LU>
 
-#include "recon/calibrate/camera_model.h"
 #include "recon/hull/clip_bundle.h"
 #include "recon/hull/hull.h"
 #include "recon/hull/kernel_views.h"
 #include "recon/hull/ray_list_cuda.h"
 #include "recon/kernels/cut.h"
+#include "recon/views/camera_model.h"
 
 namespace emberlock::recon {
 namespace {

@@ -11,7 +11,7 @@
 #include "recon/kernels/cut.h"
 #include "recon/kernels/march.h"
 #include "recon/kernels/refract.h"
-#include "recon/preprocess/flame_mask.h"
+#include "recon/views/flame_mask.h"
 
 namespace emberlock::recon {
 

@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "recon/preprocess/view.h"
+#include "recon/views/view.h"
 
 namespace emberlock::recon {
 

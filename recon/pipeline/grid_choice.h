@@ -3,7 +3,7 @@
 
 #include "base/result.h"
 #include "recon/kernels/grid.h"
-#include "recon/preprocess/view.h"
+#include "recon/views/view.h"
 
 namespace emberlock::recon {
 

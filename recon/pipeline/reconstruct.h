@@ -18,8 +18,8 @@
 #include "recon/effects/effects.h"
 #include "recon/export/certificate.h"
 #include "recon/export/report.h"
-#include "recon/preprocess/view.h"
 #include "recon/temperature/temperature.h"
+#include "recon/views/view.h"
 
 namespace emberlock::recon {
 

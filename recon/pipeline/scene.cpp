@@ -10,7 +10,7 @@
 #include "recon/hull/find_box.h"
 #include "recon/pipeline/session_scene.h"
 #include "recon/preprocess/develop.h"
-#include "recon/preprocess/flame_mask.h"
+#include "recon/views/flame_mask.h"
 #include "session/media/frame_file.h"
 #include "session/reader.h"
 

@@ -11,8 +11,8 @@
 #include "base/progress.h"
 #include "base/result.h"
 #include "recon/pipeline/session_picture.h"
-#include "recon/preprocess/flame_mask.h"
-#include "recon/preprocess/view.h"
+#include "recon/views/flame_mask.h"
+#include "recon/views/view.h"
 
 namespace emberlock::recon {
 

@@ -15,7 +15,7 @@
 #include "recon/compute/pool.h"
 #include "recon/hull/find_box.h"
 #include "recon/pipeline/session_picture.h"
-#include "recon/preprocess/flame_mask.h"
+#include "recon/views/flame_mask.h"
 #include "session/reader.h"
 #include "session/shutter_times.h"
 

@@ -5,14 +5,14 @@
 #include <vector>
 
 #include "base/result.h"
-#include "recon/calibrate/box.h"
-#include "recon/calibrate/camera_model.h"
 #include "recon/compute/device.h"
 #include "recon/effects/lighting.h"
 #include "recon/hull/medium.h"
-#include "recon/preprocess/radiance_image.h"
 #include "recon/render/in_scatter.h"
 #include "recon/render/volume.h"
+#include "recon/views/box.h"
+#include "recon/views/camera_model.h"
+#include "recon/views/radiance_image.h"
 
 namespace emberlock::recon {
 

@@ -12,9 +12,9 @@
 #include "recon/compute/cuda_device.h"
 #include "recon/pipeline/coverage.h"
 #include "recon/pipeline/grid_choice.h"
-#include "recon/preprocess/flame_mask.h"
 #include "recon/preprocess/radiance.h"
 #include "recon/render/render.h"
+#include "recon/views/flame_mask.h"
 
 namespace emberlock::recon {
 namespace {

@@ -11,10 +11,10 @@
 #include "base/image.h"
 #include "base/sensor_kind.h"
 #include "recon/preprocess/colour.h"
-#include "recon/preprocess/raw_picture.h"
 #include "recon/preprocess/samples.h"
 #include "recon/preprocess/smear.h"
-#include "recon/preprocess/view.h"
+#include "recon/views/raw_picture.h"
+#include "recon/views/view.h"
 
 namespace emberlock::recon {
 

@@ -9,7 +9,7 @@
 #include "base/result.h"
 #include "recon/preprocess/colour.h"
 #include "recon/preprocess/patch_reading.h"
-#include "recon/preprocess/radiance_image.h"
+#include "recon/views/radiance_image.h"
 
 namespace emberlock::recon {
 

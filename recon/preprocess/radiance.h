@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "base/image.h"
-#include "recon/preprocess/view.h"
+#include "recon/views/view.h"
 
 namespace emberlock::recon {
 

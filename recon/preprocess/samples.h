@@ -7,7 +7,7 @@
 #include "base/image.h"
 #include "recon/kernels/develop.h"
 #include "recon/preprocess/colour.h"
-#include "recon/preprocess/view.h"
+#include "recon/views/view.h"
 
 namespace emberlock::recon {
 

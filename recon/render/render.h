@@ -7,9 +7,9 @@
 #include "recon/effects/effects.h"
 #include "recon/effects/refraction.h"
 #include "recon/hull/hull.h"
-#include "recon/preprocess/view.h"
 #include "recon/render/in_scatter.h"
 #include "recon/render/volume.h"
+#include "recon/views/view.h"
 
 namespace emberlock::recon {
 

@@ -8,8 +8,8 @@
 #include "base/quantity.h"
 #include "recon/effects/effects.h"
 #include "recon/hull/hull.h"
-#include "recon/preprocess/view.h"
 #include "recon/render/volume.h"
+#include "recon/views/view.h"
 
 namespace emberlock::recon {
 

@@ -7,9 +7,9 @@
 #include "drivers/virtual/light_field.h"
 #include "drivers/virtual/virtual_rig.h"
 #include "emberlock/v1/session.pb.h"
-#include "recon/calibrate/box.h"
-#include "recon/calibrate/camera_model.h"
 #include "recon/synthetic/flame.h"
+#include "recon/views/box.h"
+#include "recon/views/camera_model.h"
 
 namespace emberlock::rig {
 

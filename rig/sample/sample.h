@@ -11,8 +11,8 @@
 #include "base/quantity.h"
 #include "base/result.h"
 #include "recon/calibrate/board.h"
-#include "recon/calibrate/box.h"
-#include "recon/calibrate/camera_model.h"
+#include "recon/views/box.h"
+#include "recon/views/camera_model.h"
 
 namespace emberlock::rig {
 

@@ -6,7 +6,7 @@
 
 #include "base/quantity.h"
 #include "drivers/virtual/light_field.h"
-#include "recon/preprocess/radiance_image.h"
+#include "recon/views/radiance_image.h"
 
 namespace emberlock::rig {
 

@@ -12,7 +12,7 @@
 #include "recon/calibrate/camera_response.h"
 #include "recon/compute/device.h"
 #include "recon/synthetic/flame_simulation.h"
-#include "recon/synthetic/visible_gas.h"
+#include "recon/temperature/visible_gas.h"
 
 namespace emberlock::rig {
 

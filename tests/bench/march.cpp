@@ -37,9 +37,9 @@
 #include "recon/adjust/solver.h"
 #include "recon/compute/cuda_device.h"
 #include "recon/hull/hull.h"
-#include "recon/preprocess/flame_mask.h"
 #include "recon/render/render.h"
 #include "recon/synthetic/flame.h"
+#include "recon/views/flame_mask.h"
 
 namespace {
 

@@ -20,7 +20,7 @@
 #include "recon/adjust/picture_error.h"
 #include "recon/pipeline/frame_sequence.h"
 #include "recon/pipeline/scene.h"
-#include "recon/preprocess/shrink.h"
+#include "recon/views/shrink.h"
 #include "tests/support/scene_files.h"
 
 using namespace emberlock;

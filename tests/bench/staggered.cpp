@@ -17,9 +17,9 @@
 #include "recon/adjust/picture_error.h"
 #include "recon/adjust/volume_flow.h"
 #include "recon/pipeline/reconstruct.h"
-#include "recon/preprocess/flame_mask.h"
 #include "recon/render/render.h"
 #include "recon/synthetic/flame.h"
+#include "recon/views/flame_mask.h"
 #include "smear_sync/align/stagger.h"
 
 using namespace emberlock;

@@ -10,7 +10,7 @@
 
 #include "base/random.h"
 #include "recon/calibrate/calibrate_rig.h"
-#include "recon/synthetic/carried_board.h"
+#include "recon/calibrate/carried_board.h"
 
 namespace emberlock::test {
 

@@ -5,7 +5,7 @@
 
 #include <Eigen/Dense>
 
-#include "recon/calibrate/camera_model.h"
+#include "recon/views/camera_model.h"
 
 namespace emberlock::test {
 

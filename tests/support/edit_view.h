@@ -3,7 +3,7 @@
 
 #include <utility>
 
-#include "recon/preprocess/view.h"
+#include "recon/views/view.h"
 
 namespace emberlock {
 

@@ -5,10 +5,10 @@
 #include <vector>
 
 #include "base/random.h"
-#include "recon/calibrate/camera_model.h"
 #include "recon/effects/refraction.h"
 #include "recon/hull/hull.h"
 #include "recon/hull/ray_list.h"
+#include "recon/views/camera_model.h"
 #include "tests/support/marches.h"
 
 namespace emberlock {

@@ -15,8 +15,8 @@
 #include "base/image.h"
 #include "base/random.h"
 #include "recon/calibrate/board.h"
-#include "recon/calibrate/camera_model.h"
 #include "recon/calibrate/markers.h"
+#include "recon/views/camera_model.h"
 
 // Pictures of a marker on a plate, with truth.
 namespace emberlock::test {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "recon/preprocess/picture_on_gpu.h"
+#include "recon/views/picture_on_gpu.h"
 #include "tests/support/picture_on_gpu.h"
 
 namespace emberlock::test {

@@ -3,7 +3,7 @@
 
 #include <vector>
 
-#include "recon/preprocess/radiance_image.h"
+#include "recon/views/radiance_image.h"
 
 namespace emberlock::test {
 

@@ -11,7 +11,7 @@
 #include "recon/calibrate/pose.h"
 #include "recon/export/picture.h"
 #include "recon/preprocess/radiance.h"
-#include "recon/preprocess/view.h"
+#include "recon/views/view.h"
 
 namespace emberlock::test {
 

@@ -6,13 +6,13 @@
 #include <cmath>
 #include <vector>
 
-#include "recon/calibrate/camera_model.h"
 #include "recon/calibrate/camera_response.h"
 #include "recon/compute/pool.h"
 #include "recon/kernels/planck.h"
-#include "recon/preprocess/radiance_image.h"
 #include "recon/render/volume.h"
 #include "recon/temperature/emitter.h"
+#include "recon/views/camera_model.h"
+#include "recon/views/radiance_image.h"
 
 namespace emberlock::test {
 

@@ -11,8 +11,8 @@
 
 #include <Eigen/Core>
 
-#include "recon/calibrate/camera_model.h"
 #include "recon/export/picture.h"
+#include "recon/views/camera_model.h"
 
 namespace emberlock::test {
 

@@ -8,7 +8,7 @@
 #include <Eigen/Core>
 
 #include "recon/hull/hull.h"
-#include "recon/preprocess/flame_mask.h"
+#include "recon/views/flame_mask.h"
 
 namespace emberlock::paper {
 namespace {

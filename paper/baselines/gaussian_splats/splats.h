@@ -5,10 +5,10 @@
 #include <cstddef>
 #include <vector>
 
-#include "recon/calibrate/camera_model.h"
 #include "recon/kernels/grid.h"
-#include "recon/preprocess/flame_mask.h"
-#include "recon/preprocess/view.h"
+#include "recon/views/camera_model.h"
+#include "recon/views/flame_mask.h"
+#include "recon/views/view.h"
 
 namespace emberlock::paper {
 

@@ -16,8 +16,8 @@
 
 #include "cli/commands.h"
 #include "recon/calibrate/board_pictures.h"
+#include "recon/calibrate/carried_board.h"
 #include "recon/calibrate/rig_formats.h"
-#include "recon/synthetic/carried_board.h"
 #include "session/writer.h"
 #include "tests/support/board_rig.h"
 #include "tests/support/recording.h"

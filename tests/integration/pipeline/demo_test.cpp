@@ -11,7 +11,7 @@
 
 #include "base/file.h"
 #include "recon/adjust/picture_error.h"
-#include "recon/preprocess/flame_mask.h"
+#include "recon/views/flame_mask.h"
 #include "report/demo_report.h"
 #include "rig/align/record.h"
 #include "session/reader.h"

@@ -10,7 +10,7 @@
 #include "recon/hull/hull.h"
 #include "recon/pipeline/reconstruct.h"
 #include "recon/pipeline/scene.h"
-#include "recon/preprocess/flame_mask.h"
+#include "recon/views/flame_mask.h"
 #include "tests/support/recordings.h"
 
 namespace emberlock {

@@ -41,8 +41,8 @@ const std::map<std::string, std::set<std::string>> kMayInclude{
 // Inside these a folder includes itself, the ones before it, and what lies directly in the house's folder.
 const std::map<std::string, std::vector<std::string>> kInnerOrder{
     {"recon",
-     {"kernels", "compute", "calibrate", "preprocess", "hull", "effects", "render", "adjust", "temperature",
-      "synthetic", "export", "pipeline", "batch"}},
+     {"kernels", "compute", "views", "hull", "effects", "render", "adjust", "synthetic",  // recon_core
+      "calibrate", "preprocess", "temperature", "export", "pipeline", "batch"}},
     {"smear_sync", {"detect", "clocks", "sensors", "align", "verify"}},
     {"session", {"media"}},
 };
@@ -180,6 +180,40 @@ TEST(House, NothingOutsideOfPaperNeedsIt) {
     EXPECT_TRUE(line.starts_with("emberlock-paper ")) << line;
   }
   EXPECT_EQ(users, 1);
+}
+
+TEST(House, ReconCoreIncludesOfOtherRoomsOnlyBase) {
+  const std::vector<std::string>& order = kInnerOrder.at("recon");
+  for (const auto& [file, header] : includes_below("recon")) {
+    const auto folder = std::find(order.begin(), order.end(), part(file, 1));
+    if (folder >= std::find(order.begin(), order.end(), "calibrate")) continue;
+    EXPECT_TRUE(header.starts_with("recon/") || header.starts_with("base/"))
+        << file << " includes \"" << header << '"';
+  }
+}
+
+TEST(House, ATargetOfReconLinksOnlyLowerOnes) {
+  const std::vector<std::string> order{"core", "calibrate", "measure", "io"};
+  const std::set<std::string> below_core{"emberlock::base", "Eigen3::Eigen", "TBB::tbb", "hwy",
+                                         "CUDA::cudart_static"};
+  const auto rank = [&](const std::string& link) {
+    return std::find(order.begin(), order.end(), link.substr(link.rfind('_') + 1)) - order.begin();
+  };
+  std::ifstream file(fs::path(EMBERLOCK_BUILD_DIR) / "links.txt");
+  std::size_t found = 0;
+  for (std::string line; std::getline(file, line);) {
+    std::istringstream words(line);
+    std::string target;
+    words >> target;
+    if (!target.starts_with("emberlock_recon_")) continue;
+    ++found;
+    ASSERT_LT(rank(target), static_cast<std::ptrdiff_t>(order.size())) << target;
+    for (std::string link; words >> link;) {
+      if (link.starts_with("emberlock::recon")) EXPECT_LT(rank(link), rank(target)) << target << ' ' << link;
+      if (rank(target) == 0) EXPECT_TRUE(below_core.contains(link)) << target << ' ' << link;
+    }
+  }
+  EXPECT_EQ(found, order.size());
 }
 
 /// Headers that include each other are one in two files.

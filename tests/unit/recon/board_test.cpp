@@ -6,7 +6,7 @@
 #include <Eigen/Geometry>
 #include <gmock/gmock.h>
 
-#include "recon/synthetic/carried_board.h"
+#include "recon/calibrate/carried_board.h"
 
 namespace emberlock::recon {
 namespace {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "recon/calibrate/camera_model.h"
+#include "recon/views/camera_model.h"
 
 #include <cmath>
 

@@ -6,7 +6,7 @@
 
 #include <gtest/gtest.h>
 
-#include "recon/preprocess/view.h"
+#include "recon/views/view.h"
 #include "tests/support/devices.h"
 #include "tests/support/march_case.h"
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "recon/preprocess/flame_mask.h"
+#include "recon/views/flame_mask.h"
 
 #include <algorithm>
 #include <cmath>
@@ -8,7 +8,7 @@
 
 #include "base/random.h"
 #include "recon/preprocess/radiance.h"
-#include "recon/preprocess/view.h"
+#include "recon/views/view.h"
 #include "tests/support/devices.h"
 #include "tests/support/small_flame.h"
 

@@ -5,7 +5,7 @@
 
 #include <gtest/gtest.h>
 
-#include "recon/preprocess/check_scene.h"
+#include "recon/views/check_scene.h"
 #include "tests/support/devices.h"
 #include "tests/support/edit_view.h"
 #include "tests/support/small_flame.h"

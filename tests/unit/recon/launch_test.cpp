@@ -9,13 +9,13 @@
 
 #include <gtest/gtest.h>
 
-#include "recon/calibrate/camera_model.h"
 #include "recon/hull/hull.h"
 #include "recon/hull/kernel_views.h"
 #include "recon/hull/ray_list_cuda.h"
 #include "recon/kernels/field.h"
 #include "recon/kernels/gather.h"
 #include "recon/kernels/paper.h"
+#include "recon/views/camera_model.h"
 #include "tests/support/march_case.h"
 #include "tests/support/ring_scene.h"
 

@@ -12,7 +12,7 @@
 #include <gtest/gtest.h>
 
 #include "recon/adjust/engine.h"
-#include "recon/preprocess/view.h"
+#include "recon/views/view.h"
 #include "tests/support/devices.h"
 #include "tests/support/march_case.h"
 

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <gtest/gtest.h>
 
-#include "recon/calibrate/camera_model.h"
 #include "recon/render/render.h"
 #include "recon/synthetic/flame.h"
+#include "recon/views/camera_model.h"
 #include "tests/support/devices.h"
 
 namespace emberlock::recon {

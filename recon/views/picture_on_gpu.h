@@ -4,7 +4,7 @@
 #include <memory>
 
 #include "recon/compute/cuda_buffer.h"
-#include "recon/preprocess/radiance_image.h"
+#include "recon/views/radiance_image.h"
 
 namespace emberlock::recon {
 

@@ -5,8 +5,8 @@
 
 #include "recon/compute/cuda_launch.h"
 #include "recon/compute/gpu_pictures.h"
-#include "recon/preprocess/picture_on_gpu.h"
-#include "recon/preprocess/raw_picture.h"
+#include "recon/views/picture_on_gpu.h"
+#include "recon/views/raw_picture.h"
 
 namespace emberlock::recon {
 namespace {

@@ -4,8 +4,8 @@
 #include <array>
 #include <optional>
 
-#include "recon/preprocess/flame_mask.h"
-#include "recon/preprocess/view.h"
+#include "recon/views/flame_mask.h"
+#include "recon/views/view.h"
 
 namespace emberlock::recon {
 

@@ -6,7 +6,7 @@
 #include "base/image.h"
 #include "base/random.h"
 #include "recon/calibrate/board.h"
-#include "recon/calibrate/camera_model.h"
+#include "recon/views/camera_model.h"
 
 namespace emberlock::recon {
 

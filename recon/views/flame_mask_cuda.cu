@@ -4,8 +4,8 @@
 
 #include "recon/compute/cuda_launch.h"
 #include "recon/kernels/flame.h"
-#include "recon/preprocess/flame_mask_cuda.h"
-#include "recon/preprocess/picture_on_gpu.h"
+#include "recon/views/flame_mask_cuda.h"
+#include "recon/views/picture_on_gpu.h"
 
 namespace emberlock::recon {
 namespace {

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include "recon/preprocess/view.h"
+#include "recon/views/view.h"
 
 namespace emberlock::recon {
 

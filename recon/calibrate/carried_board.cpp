@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "recon/synthetic/carried_board.h"
+#include "recon/calibrate/carried_board.h"
 
 #include <cmath>
 #include <cstddef>

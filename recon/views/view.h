@@ -8,12 +8,13 @@
 #include <vector>
 
 #include "base/quantity.h"
-#include "recon/calibrate/box.h"
-#include "recon/calibrate/camera_model.h"
-#include "recon/calibrate/camera_response.h"
-#include "recon/preprocess/radiance_image.h"
+#include "recon/views/box.h"
+#include "recon/views/camera_model.h"
+#include "recon/views/radiance_image.h"
 
 namespace emberlock::recon {
+
+struct CameraResponse;
 
 enum class ViewRole { input, held_out };
 

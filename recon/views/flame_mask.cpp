@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "recon/preprocess/flame_mask.h"
+#include "recon/views/flame_mask.h"
 
 #include <algorithm>
 #include <cmath>
@@ -7,8 +7,8 @@
 
 #include "recon/compute/cuda_device.h"
 #include "recon/compute/pool.h"
-#include "recon/preprocess/flame_mask_cuda.h"
-#include "recon/preprocess/view.h"
+#include "recon/views/flame_mask_cuda.h"
+#include "recon/views/view.h"
 
 namespace emberlock::recon {
 namespace {

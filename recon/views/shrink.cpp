@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "recon/preprocess/shrink.h"
+#include "recon/views/shrink.h"
 
 #include <cstdint>
 #include <utility>

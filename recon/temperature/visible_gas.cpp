@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "recon/synthetic/visible_gas.h"
+#include "recon/temperature/visible_gas.h"
 
 #include <cmath>
 

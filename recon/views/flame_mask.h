@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "recon/compute/device.h"
-#include "recon/preprocess/radiance_image.h"
+#include "recon/views/radiance_image.h"
 
 namespace emberlock::recon {
 

@@ -6,12 +6,12 @@
 
 #include <Eigen/Core>
 
-#include "recon/calibrate/camera_model.h"
 #include "recon/calibrate/camera_response.h"
 #include "recon/compute/device.h"
-#include "recon/preprocess/radiance_image.h"
 #include "recon/render/volume.h"
 #include "recon/synthetic/flame_simulation.h"
+#include "recon/views/camera_model.h"
+#include "recon/views/radiance_image.h"
 
 namespace emberlock::recon {
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "recon/preprocess/check_scene.h"
+#include "recon/views/check_scene.h"
 
 #include <algorithm>
 #include <bit>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "recon/preprocess/picture_clues.h"
+#include "recon/views/picture_clues.h"
 
 #include <algorithm>
 #include <cmath>

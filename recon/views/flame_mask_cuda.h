@@ -4,7 +4,7 @@
 #include <optional>
 #include <vector>
 
-#include "recon/preprocess/flame_mask.h"
+#include "recon/views/flame_mask.h"
 
 namespace emberlock::recon {
 

@@ -18,5 +18,5 @@ export default defineConfig({
       {find: /^playwright-core$/, replacement: `${modules}playwright-core/index.mjs`},
     ],
   },
-  test: {include: ['tests/browser/**/*.test.ts'], fileParallelism: false, testTimeout: 30_000, hookTimeout: 60_000},
+  test: {include: ['tests/browser/**/*.test.ts'], fileParallelism: false, testTimeout: 900_000, hookTimeout: 900_000},
 });

@@ -25,7 +25,7 @@
 
 #include "base/unique_fd.h"
 #include "session/files.h"
-#include "tests/support/daemon_program.h"
+#include "tests/support/program.h"
 #include "tests/support/recording.h"
 
 namespace emberlock {
@@ -130,7 +130,7 @@ void measure_start(const fs::path& folder, const std::string& program) {
                         << (folder / "sessions").string() << "\"\n[server]\nsocket = \""
                         << (folder / "d.sock").string() << "\"\nhttp_listen = \"\"\n";
   const double clock = clock_seconds();
-  test::Program daemon(program.c_str(), config, {{"NOTIFY_SOCKET", socket.string()}});
+  test::Program daemon({program, "--config", config}, {{"NOTIFY_SOCKET", socket.string()}});
   std::string heard;
   std::array<char, 4096> text{};
   while (heard.find("READY=1") == std::string::npos) {

@@ -146,6 +146,7 @@ class Daemon {
 /// Everything that a soak's threads share.
 struct Soak {
   const Plan plan;
+  const test::ReservedPort port;
   Daemon daemon;
   Findings findings;
   std::atomic<bool> over = false;
@@ -154,7 +155,7 @@ struct Soak {
   std::atomic<std::uint64_t> pictures = 0;
   std::vector<double> resident_mb = {};  ///< one a second
 
-  explicit Soak(Plan given) : plan(std::move(given)), daemon(plan, test::free_port()) {}
+  explicit Soak(Plan given) : plan(std::move(given)), daemon(plan, port.number()) {}
   void pause(std::chrono::milliseconds time) {
     for (const auto until = Clock::now() + time; !over && Clock::now() < until;)
       std::this_thread::sleep_for(20ms);

@@ -76,6 +76,12 @@ class FakeApi : public daemon::Api {
   }
   Result<v1::ArStatus> stop_ar() override { return ask("stop_ar", on_stop_ar); }
 
+  void show(v1::Phase phase) {
+    v1::DaemonStatus status;
+    status.set_phase(phase);
+    board_.show(status);
+  }
+
   /// Each call's name, with its request as one line: "align tolerance: \"100rows\"".
   [[nodiscard]] std::vector<std::string> calls() const {
     const std::lock_guard lock(mutex_);
@@ -150,6 +156,27 @@ class FakeApi : public daemon::Api {
   std::vector<std::string> calls_;
   daemon::Jobs jobs_;  ///< last: its threads use all of the above
 };
+
+/// Answers for a FakeApi. A recording of the name that was asked for.
+inline Result<v1::RecordingStatus> recording_of_that_name(const v1::RecordRequest& request) {
+  v1::RecordingStatus status;
+  status.set_session(request.name());
+  return status;
+}
+/// The third step, if it has the picture "voxels".
+inline Result<v1::StylizationStatus> step_with_picture(const v1::EditRequest& request) {
+  if (request.picture() != "voxels") return Error{ErrorKind::bad_input, "is missing", "step: picture"};
+  v1::StylizationStatus status;
+  status.set_steps(3);
+  return status;
+}
+/// The voxels "voxels", of frame 12 only.
+inline std::shared_ptr<const v1::IterationPreview> twelfth_frame(const v1::FrameRequest& request) {
+  if (request.frame() != 12) return nullptr;
+  auto kept = std::make_shared<v1::IterationPreview>();
+  kept->mutable_volume()->set_voxels("voxels");
+  return kept;
+}
 
 /// Jobs, for on_job. This one tells how far it is as often as that, and is done.
 inline std::function<daemon::JobResult(const Observer&)> job_that_tells(int times) {

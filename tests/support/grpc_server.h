@@ -28,11 +28,7 @@ class GrpcServerTest : public testing::Test {
     return grpc::CreateChannel("unix:" + socket.string(), grpc::InsecureChannelCredentials());
   }
 
-  void show(v1::Phase phase) {
-    v1::DaemonStatus status;
-    status.set_phase(phase);
-    api.board().show(status);
-  }
+  void show(v1::Phase phase) { api.show(phase); }
 
   TempFolder folder;
   std::filesystem::path socket = folder / "emberlockd.sock";

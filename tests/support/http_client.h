@@ -31,18 +31,27 @@ inline UniqueFd connect_to(int port) {
   return fd;
 }
 
-/// A port of this machine that nobody listens on.
-inline int free_port() {
-  const UniqueFd fd(::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0));
-  sockaddr_in address{};
-  address.sin_family = AF_INET;
-  address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
-  socklen_t size = sizeof(address);
-  auto* const any = reinterpret_cast<sockaddr*>(&address);
-  if (::bind(fd.get(), any, size) != 0 || ::getsockname(fd.get(), any, &size) != 0)
-    throw std::runtime_error("no port is free");
-  return ntohs(address.sin_port);
-}
+/// A port of this machine for a server that reuses addresses: as long as this lives no other program gets it.
+class ReservedPort {
+ public:
+  ReservedPort() {
+    sockaddr_in address{};
+    address.sin_family = AF_INET;
+    address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+    socklen_t size = sizeof(address);
+    auto* const any = reinterpret_cast<sockaddr*>(&address);
+    const int yes = 1;
+    if (::setsockopt(fd_.get(), SOL_SOCKET, SO_REUSEADDR, &yes, sizeof yes) != 0 ||
+        ::bind(fd_.get(), any, size) != 0 || ::getsockname(fd_.get(), any, &size) != 0)
+      throw std::runtime_error("no port is free");
+    number_ = ntohs(address.sin_port);
+  }
+  [[nodiscard]] int number() const { return number_; }
+
+ private:
+  UniqueFd fd_{::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0)};
+  int number_ = 0;
+};
 
 inline void send_all(const UniqueFd& socket, std::string_view bytes) {
   while (!bytes.empty()) {

@@ -2,7 +2,6 @@
 #pragma once
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <csignal>
 #include <filesystem>
@@ -11,7 +10,6 @@
 #include <optional>
 #include <stdexcept>
 #include <string>
-#include <thread>
 #include <vector>
 
 #include <fcntl.h>
@@ -22,9 +20,11 @@
 #include "base/quantity.h"
 #include "base/time_point.h"
 #include "base/unique_fd.h"
+#include "session/camera_reader.h"
 #include "session/reader.h"
 #include "tests/support/certificate.h"
 #include "tests/support/shell.h"
+#include "tests/support/wait.h"
 
 namespace emberlock::test {
 
@@ -156,21 +156,24 @@ class LabHost {
     ::kill(pid_, SIGKILL);
     ::waitpid(pid_, nullptr, 0);
     pid_ = -1;
-    while (!daemon.empty() && std::filesystem::exists("/proc/" + daemon))
-      std::this_thread::sleep_for(std::chrono::milliseconds(10));
+    wait_until([&] { return daemon.empty() || !std::filesystem::exists("/proc/" + daemon); });
   }
   [[nodiscard]] Shell client(const std::string& words) const {
     return shell(programs_.emberlock + " " + words +
                  " --daemon unix:" + (folder_ / "run" / "d.sock").string());
   }
-  /// Asks until the answer has `words`, for two minutes: the machine may be busy.
+  /// Asks until the answer has `words`.
   [[nodiscard]] bool answers(const std::string& question, const std::string& words) const {
-    const auto end = std::chrono::steady_clock::now() + std::chrono::minutes(2);
-    while (std::chrono::steady_clock::now() < end) {
-      if (client(question).output.find(words) != std::string::npos) return true;
-      std::this_thread::sleep_for(std::chrono::milliseconds(100));
-    }
-    return false;
+    return wait_until([&] { return client(question).output.find(words) != std::string::npos; });
+  }
+  /// Frames of its first camera that a session's index has so far.
+  [[nodiscard]] std::size_t recorded(const std::string& session) const {
+    const auto index = session::read_index(sessions() / session, letter() + "-00");
+    return index.ok() ? index->records.size() : 0;
+  }
+  /// Waits until a session has so many frames of its first camera.
+  [[nodiscard]] bool records(const std::string& session, std::size_t frames) const {
+    return wait_until([&] { return recorded(session) >= frames; });
   }
 
  private:

@@ -1,13 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <chrono>
 #include <cstdio>
 #include <filesystem>
 #include <memory>
 #include <stdexcept>
 #include <string>
-#include <thread>
 
 #include <fcntl.h>
 #include <linux/fs.h>
@@ -18,6 +16,7 @@
 
 #include "base/unique_fd.h"
 #include "tests/support/shell.h"
+#include "tests/support/wait.h"
 
 // Disks with a real file system, in files: the power is cut by taking the file as it is. For root alone, with
 // loop devices.
@@ -54,12 +53,12 @@ class LoopDisk {
   LoopDisk& operator=(const LoopDisk&) = delete;
   ~LoopDisk() {
     // A process that was killed lets go of its files when its writes are through.
-    for (int i = 0; i < 100; ++i) {
-      const Shell done = shell("umount " + at_.string());
-      if (done.status == 0) return;
-      if (i % 20 == 19) std::fprintf(stderr, "%s", done.output.c_str());
-      std::this_thread::sleep_for(std::chrono::milliseconds(100));
-    }
+    Shell done;
+    const bool unmounted = wait_until([&] {
+      done = shell("umount " + at_.string());
+      return done.status == 0;
+    });
+    if (!unmounted) std::fprintf(stderr, "%s", done.output.c_str());
   }
 
   [[nodiscard]] const std::filesystem::path& image() const { return image_; }

@@ -28,6 +28,7 @@
 #include "session/reader.h"
 #include "session/salvage.h"
 #include "session/verify.h"
+#include "tests/support/wait.h"
 
 // A recorder in a process of its own, which is killed or whose disk is taken away, and what is left of its
 // recording.
@@ -117,12 +118,19 @@ inline std::shared_ptr<const Image> trial_picture(const ImageLayout& layout, std
   }
 }
 
-/// Records into `folder` for `seconds`, calls `disaster` with the recorder's process id, and looks at what is
-/// left of the session in the folder that `disaster` names, by then salvaged. What was called recorded until
-/// then must be there.
+/// What was known of a camera before a disaster.
+struct Before {
+  std::int64_t newest_ns;
+  std::uint64_t recorded, arrived, dropped;
+};
+
+/// Records into `folder` for `seconds`, and on until `moment` of each camera, if that is set. Then it calls
+/// `disaster` with the recorder's process id, and looks at what is left of the session in the folder that
+/// `disaster` names, by then salvaged. What was called recorded until then must be there.
 inline TrialOutcome lose_a_recording(const std::filesystem::path& folder, const TrialFleet& fleet,
                                      double seconds,
-                                     const std::function<std::filesystem::path(pid_t)>& disaster) {
+                                     const std::function<std::filesystem::path(pid_t)>& disaster,
+                                     const std::function<bool(const Before&)>& moment = {}) {
   void* const shared =
       ::mmap(nullptr, sizeof(Told), PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0);
   if (shared == MAP_FAILED) throw std::runtime_error("no shared memory");
@@ -131,17 +139,20 @@ inline TrialOutcome lose_a_recording(const std::filesystem::path& folder, const 
   if (child == 0) film_until_killed(folder, fleet, told);
   std::this_thread::sleep_for(std::chrono::duration<double>(seconds));
   TrialOutcome outcome;
-  struct Before {
-    std::int64_t newest_ns;
-    std::uint64_t recorded, arrived, dropped;
-  };
   std::vector<Before> before;
-  for (std::size_t c = 0; c < fleet.cameras; ++c) {
-    Told::Camera& camera = told.cameras[c];
-    before.push_back({camera.newest_ns, camera.recorded, camera.arrived, camera.dropped});
-    outcome.arrived += before.back().arrived;
-    outcome.dropped += before.back().dropped;
+  const bool came = wait_until([&] {
+    before.clear();
+    for (std::size_t c = 0; c < fleet.cameras; ++c) {
+      Told::Camera& camera = told.cameras[c];
+      before.push_back({camera.newest_ns, camera.recorded, camera.arrived, camera.dropped});
+    }
+    return told.failed || !moment || std::all_of(before.begin(), before.end(), moment);
+  });
+  for (const Before& camera : before) {
+    outcome.arrived += camera.arrived;
+    outcome.dropped += camera.dropped;
   }
+  if (!came) outcome.wrong = "the moment never came";
   if (told.failed) outcome.wrong = "the recorder failed by itself";
   const std::filesystem::path left = disaster(child);
   int status = 0;

@@ -1,20 +1,19 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <chrono>
-#include <csignal>
+#include <algorithm>
 #include <filesystem>
 #include <fstream>
+#include <iterator>
 #include <memory>
 #include <optional>
 #include <string>
-#include <thread>
 
 #include <gtest/gtest.h>
 
 #include "daemon/reconstruction/child.h"
-#include "session/child_messages.h"
 #include "session/files.h"
+#include "tests/support/child_script.h"
 #include "tests/support/recording.h"
 #include "tests/support/wait.h"
 
@@ -37,14 +36,12 @@ class ReconstructionChildTest : public testing::Test {
 
   /// With ROOT for the folder. What `message(NAME, ...)` wrote is sent by `cat ROOT/NAME >&3`.
   daemon::ReconstructionChild& with_script(const std::string& script) {
-    std::ofstream(root_ / "program") << "#!/bin/sh\nROOT='" << root_.path().string() << "'\n"
-                                     << script << "\n";
-    std::filesystem::permissions(root_ / "program", std::filesystem::perms::owner_all);
+    put_script(root_.path(), script);
     child_ = std::make_unique<daemon::ReconstructionChild>(options_, board_, jobs_.emplace());
     return *child_;
   }
   void message(const std::string& name, const v1::ChildMessage& message) const {
-    std::ofstream(root_ / name, std::ios::binary) << session::framed(message);
+    put_message(root_ / name, message);
   }
   void done_message() const {
     v1::ChildMessage done;
@@ -56,9 +53,10 @@ class ReconstructionChildTest : public testing::Test {
     request.set_session(session);
     return request;
   }
-  /// Waits until it runs no more.
+  /// Waits until it runs no more, and its thread has let go of it.
   v1::ReconstructionStatus end() {
     wait_until([&] { return child_->status()->state() != v1::ReconstructionStatus::RUNNING; });
+    jobs_->drain();
     return *child_->status();
   }
   v1::ReconstructionStatus end_of(const std::string& script) {
@@ -68,26 +66,32 @@ class ReconstructionChildTest : public testing::Test {
   }
   /// Waits until a script has written the file whole.
   std::string wait_for_line(const std::string& name) const {
-    for (int i = 0; i < 2000; ++i) {
+    std::string line;
+    EXPECT_TRUE(wait_until([&] {
       std::ifstream in(root_ / name);
-      std::string line;
-      if (std::getline(in, line) && !in.eof()) return line;
-      std::this_thread::sleep_for(std::chrono::milliseconds(5));
-    }
-    ADD_FAILURE() << name << " never came";
-    return {};
+      return std::getline(in, line) && !in.eof();
+    })) << name
+        << " never came";
+    return line;
   }
-  /// Whether a process is gone, or will be within seconds.
+  /// Waits until a process is gone, or dead.
   static bool goes_away(const std::string& pid) {
-    for (int i = 0; i < 1000; ++i) {
-      if (::kill(std::stoi(pid), 0) != 0) return true;
+    return wait_until([&] {
       std::ifstream stat("/proc/" + pid + "/stat");
       std::string text;
-      std::getline(stat, text);
-      if (text.find(") Z ") != std::string::npos) return true;  // dead, and nobody has waited for it yet
-      std::this_thread::sleep_for(std::chrono::milliseconds(5));
-    }
-    return false;
+      return !std::getline(stat, text) || text.find(") Z ") != std::string::npos;
+    });
+  }
+  /// Waits until no script runs any more.
+  bool scripts_go_away() const {
+    return wait_until([&] {
+      const auto runs = [&](const std::filesystem::directory_entry& process) {
+        std::ifstream in(process.path() / "cmdline");
+        const std::string command((std::istreambuf_iterator<char>(in)), {});
+        return command.find((root_ / "program").string()) != std::string::npos;
+      };
+      return std::none_of(std::filesystem::directory_iterator("/proc"), {}, runs);
+    });
   }
 
   TempFolder root_;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // A disk that is slow at segments, put before a program by LD_PRELOAD: each write to one waits for
-// EMBERLOCK_SLOW_DISK_MS first.
+// EMBERLOCK_SLOW_DISK_MS first, and as long as the file EMBERLOCK_SLOW_DISK_STUCK exists.
 #include <array>
 #include <cstdlib>
 #include <cstring>
@@ -27,6 +27,10 @@ extern "C" ssize_t write(int fd, const void* bytes, size_t count) {
   using Write = ssize_t (*)(int, const void*, size_t);
   static const auto next = reinterpret_cast<Write>(::dlsym(RTLD_NEXT, "write"));
   static const char* const wait_ms = std::getenv("EMBERLOCK_SLOW_DISK_MS");
-  if (wait_ms != nullptr && is_segment(fd)) ::usleep(static_cast<useconds_t>(std::atoi(wait_ms)) * 1000);
+  static const char* const stuck = std::getenv("EMBERLOCK_SLOW_DISK_STUCK");
+  if (wait_ms != nullptr && is_segment(fd)) {
+    ::usleep(static_cast<useconds_t>(std::atoi(wait_ms)) * 1000);
+    while (stuck != nullptr && ::access(stuck, F_OK) == 0) ::usleep(1000);
+  }
   return next(fd, bytes, count);
 }

@@ -11,6 +11,7 @@
 
 #include "daemon/engine/conductor.h"
 #include "tests/support/recording.h"
+#include "tests/support/wait.h"
 
 namespace emberlock::test {
 
@@ -48,11 +49,31 @@ struct SmallDaemon {
 
   /// Works until `done`, or for so many slices.
   bool work_until(const std::function<bool()>& done, int slices = 2000) {
-    for (int i = 0; i < slices && !done(); ++i) conductor->work();
+    for (int i = 0; i < slices && !done(); ++i) {
+      conductor->work();
+      // A thread of its own finishes a recording: the rig's clock must not run on meanwhile.
+      if (conductor->phase() == v1::FINISHING)
+        wait_until([this] { return !jobs.find(v1::Job::FINISH, conductor->status().recording().session()); });
+    }
     return done();
   }
   bool reach(v1::Phase phase, int slices = 2000) {
     return work_until([&] { return conductor->phase() == phase; }, slices);
+  }
+  /// Aligns the cameras, until they are locked.
+  testing::AssertionResult locks(const v1::AlignRequest& request = {}) {
+    const Status asked = conductor->align(request);
+    if (!asked.ok()) return testing::AssertionFailure() << asked.error().message();
+    if (!reach(v1::LOCKED)) return testing::AssertionFailure() << conductor->status().reason();
+    return testing::AssertionSuccess();
+  }
+  /// Begins to record; without `seconds` until it is stopped.
+  Status record(const std::string& name, double seconds = 0, bool unlocked = true) {
+    v1::RecordRequest request;
+    request.set_name(name);
+    request.set_seconds(seconds);
+    request.set_unlocked(unlocked);
+    return conductor->record(request);
   }
   [[nodiscard]] const v1::Fault* fault(v1::Fault::Kind kind) {
     status = conductor->status();

@@ -48,6 +48,16 @@ class WatchClient {
     send_all(socket_, frame);
   }
 
+  /// Says it, and waits until the server has heard it: a ping's answer comes after that. What comes until
+  /// then is passed over.
+  bool wish(std::string_view text) {
+    say(text);
+    say("", 9);
+    auto message = hear();
+    while (message && message->opcode != 10) message = hear();
+    return message.has_value();
+  }
+
   /// The next message; absent: the server ended, or, without waiting, there is none yet.
   std::optional<Message> hear() { return hear(0); }
   std::optional<Message> hear_now() { return hear(MSG_DONTWAIT); }

@@ -33,7 +33,7 @@ export function bench(): Bench {
   beforeAll(async () => {
     shared.browser = await startChromium();
     shared.lamp = await lampPictures(shared.browser, 1);
-  }, 60_000);
+  });
   afterAll(() => shared.browser.close());
   beforeEach(async () => {
     shared.mock = new Mock(kConsole);

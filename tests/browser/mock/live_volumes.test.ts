@@ -11,7 +11,7 @@ import {screenshot, until} from '../support/chromium';
 
 const rig = bench();
 const session = capturing(0).recording!.session;
-const seen = (page: Page, edge: number) => page.waitForSelector(`.volume[data-voxels="${edge ** 3}"]`, {timeout: 20_000});
+const seen = (page: Page, edge: number) => page.waitForSelector(`.volume[data-voxels="${edge ** 3}"]`);
 
 /** Of a volume whose frame was filmed so many seconds ago. */
 function live(ago: number, change: Partial<LiveStatus> = {}): LiveStatus {

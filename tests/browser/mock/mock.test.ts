@@ -28,7 +28,7 @@ beforeAll(async () => {
   lamp = await lampPictures(browser, 6);
   flame = await flamePictures(browser, 12);
   greyFlame = await flamePictures(browser, 1, 'grayscale(1)');
-}, 60_000);
+});
 afterAll(() => browser.close());
 
 beforeEach(async () => {
@@ -188,10 +188,8 @@ describe('what is shown', () => {
   test('eleven tiles live', async () => {
     mock.status = locked();
     const page = await open();
-    await page.waitForTimeout(4000);
-    const summary = await page.evaluate(() => window.emberlockDiagnostics.summary());
-    expect(summary.cameras).toBe(11);
-    expect(await text(page, '#diagnostics')).toMatch(/^11 live · [\d.]+ fps \(least [\d.]+\) · frame to screen \d+ ms \(95 %: \d+ ms\)$/);
+    await until(() => page.evaluate(() => window.emberlockDiagnostics.summary().cameras), cameras => cameras === 11, 'all are live');
+    await until(() => text(page, '#diagnostics'), words => /^11 live · [\d.]+ fps \(least [\d.]+\) · frame to screen \d+ ms \(95 %: \d+ ms\)$/.test(words), 'the line tells of them');
     await screenshot(page, 'locked-1920');
     const enlarged = page.locator('dialog.enlarged');
     await page.locator('.tile').nth(3).press('Enter');
@@ -228,15 +226,16 @@ describe('the connection', () => {
     mock.status = locked();
     const page = await open();
     await page.waitForSelector('.tile');
-    const begin = Date.now();
+    await page.clock.install();
+    await page.clock.pauseAt(Date.now() + 60_000);
     await mock.stop();
-    await page.waitForSelector('.connection-lost:not([hidden])');
-    expect(Date.now() - begin).toBeLessThan(1000);
+    await page.waitForSelector('.connection-lost:not([hidden])');  // while the page's clock stands still
     expect(await text(page, '.connection-lost')).toMatch(/What is shown is old/);
     await screenshot(page, 'lost-1920');
     mock.status = idle();
     await mock.start();
-    await page.waitForSelector('.link[data-connection=open]', {timeout: 8000});
+    await page.clock.resume();
+    await page.waitForSelector('.link[data-connection=open]');
     expect(await page.locator('.connection-lost').isVisible()).toBe(false);
     expect(await text(page, 'h1')).toBe('Idle');
   });
@@ -245,9 +244,9 @@ describe('the connection', () => {
     mock.status = locked();
     const page = await open();
     mock.silent = true;
-    await page.waitForSelector('.connection-lost:not([hidden])', {timeout: 9000});
+    await page.waitForSelector('.connection-lost:not([hidden])');
     mock.silent = false;
-    await page.waitForSelector('.link[data-connection=open]', {timeout: 9000});
+    await page.waitForSelector('.link[data-connection=open]');
   });
 
   test('a link opens the console and leaves the address; after a new start a token or another link is asked for', async () => {
@@ -262,7 +261,7 @@ describe('the connection', () => {
     mock.token = 'sesame street';
     await mock.stop();
     await mock.start();
-    await page.waitForSelector('dialog.token[open]', {timeout: 8000});
+    await page.waitForSelector('dialog.token[open]');
     expect(await text(page, 'dialog.token')).toContain('emberlock console');
     await page.fill('#token', 'open');
     await page.keyboard.press('Enter');
@@ -555,7 +554,7 @@ describe('what was recorded', () => {
     expect(await text(page, '.latest')).toBe('Iteration 5: error 4.74 of 255, held out about 5.98');
     expect(await text(page, '#reconstruction header')).toContain('adjusts the volume · 42 %');
     await page.locator('#reconstruction').scrollIntoViewIfNeeded();
-    await page.waitForSelector('.volume[data-voxels="32768"] canvas', {timeout: 20_000});
+    await page.waitForSelector('.volume[data-voxels="32768"] canvas');
     await page.waitForTimeout(800);
     const picture = async () => (await page.locator('.volume').screenshot()).toString('base64');
     const before = await picture();
@@ -564,8 +563,7 @@ describe('what was recorded', () => {
     await page.mouse.down();
     await page.mouse.move(box.x + box.width / 2 + 120, box.y + box.height / 2 + 10, {steps: 5});
     await page.mouse.up();
-    await page.waitForTimeout(500);
-    expect(await picture()).not.toBe(before);
+    await until(picture, now => now !== before, 'it turned');
     await page.keyboard.press('2');
     await page.waitForTimeout(400);
     await screenshot(page, 'reconstruction-1920');
@@ -579,7 +577,7 @@ describe('what was recorded', () => {
     await page.getByRole('button', {name: 'Cancel'}).click();
     await page.getByRole('button', {name: 'Press again to cancel'}).click();
     await until(() => mock.calls.some(({method}) => method === 'Reconstruct/Cancel'), Boolean, 'cancelled');
-  }, 60_000);
+  });
 
   test('the journal shows the newest line first, and each once', async () => {
     mock.status = idle();

@@ -33,7 +33,7 @@ function serveFrames(): void {
   };
 }
 const fetched = () => rig.mock.calls.filter(({method}) => method === 'Reconstruct/Frame').map(({request}) => request.frame);
-const seen = (page: Page, edge: number) => page.waitForSelector(`.volume[data-voxels="${edge ** 3}"]`, {timeout: 20_000});
+const seen = (page: Page, edge: number) => page.waitForSelector(`.volume[data-voxels="${edge ** 3}"]`);
 const live = (edge: number) => {
   const {header, bytes} = flameVolume(edge);
   rig.mock.tellBytes(header, bytes);
@@ -137,7 +137,7 @@ describe('played', () => {
     expect(fetched().sort()).toEqual([10, 12, 14, 16]);
     await page.locator('#reconstruction').scrollIntoViewIfNeeded();
     await screenshot(page, 'sequence');
-  }, 60_000);
+  });
 
   test('while it runs a frame that is picked stays, until the live one is asked for', async () => {
     serveFrames();
@@ -155,7 +155,7 @@ describe('played', () => {
     await page.getByRole('button', {name: 'Live'}).click();
     await seen(page, 21);
     expect(await text(page, '.player .label')).toBe('live');
-  }, 60_000);
+  });
 
   test('the daemon that does not answer ends the play, and is told once', async () => {
     rig.mock.answers['Reconstruct/Frame'] = request => {

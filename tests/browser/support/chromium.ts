@@ -4,6 +4,9 @@ import {mkdirSync, writeFileSync} from 'node:fs';
 
 import {type Browser, chromium, type Page} from 'playwright-core';
 
+/** The longest wait for what must come, in seconds, on the busiest machine: it only ends a test that hangs. */
+export const kHangGuard = 600;
+
 export async function startChromium(more: readonly string[] = []): Promise<Browser> {
   return chromium.launch({
     executablePath: process.env.EMBERLOCK_CHROMIUM ?? '/usr/bin/chromium',
@@ -23,6 +26,7 @@ export interface Watched {
 export async function openPage(browser: Browser, url: string, size: {width: number; height: number}, options: {reducedMotion?: 'reduce'} = {}): Promise<Watched> {
   const context = await browser.newContext({viewport: size, reducedMotion: options.reducedMotion ?? 'reduce'});
   const page = await context.newPage();
+  page.setDefaultTimeout(1000 * kHangGuard);
   const complaints: string[] = [];
   page.on('pageerror', error => complaints.push(`script: ${error.message}`));
   // A refused request is told here too; tests that refuse on purpose look at what the page shows instead.
@@ -54,9 +58,9 @@ export async function screenshot(page: Page, name: string, fullPage = false): Pr
 }
 
 /** Waits until what is read is as wanted; what it was at last stands in the message. */
-export async function until<T>(read: () => Promise<T> | T, wanted: (value: T) => boolean, words: string, seconds = 8): Promise<T> {
+export async function until<T>(read: () => Promise<T> | T, wanted: (value: T) => boolean, words: string): Promise<T> {
   let value = await read();
-  for (const end = Date.now() + 1000 * seconds; !wanted(value) && Date.now() < end; value = await read()) await new Promise(resolve => setTimeout(resolve, 30));
-  if (!wanted(value)) throw new Error(`not so within ${seconds} s: ${words}; it is ${JSON.stringify(value)?.slice(0, 4000)}`);
+  for (const end = Date.now() + 1000 * kHangGuard; !wanted(value) && Date.now() < end; value = await read()) await new Promise(resolve => setTimeout(resolve, 30));
+  if (!wanted(value)) throw new Error(`not so within ${kHangGuard} s: ${words}; it is ${JSON.stringify(value)?.slice(0, 4000)}`);
   return value;
 }

@@ -70,7 +70,7 @@ console = "${console}"
     for (const stream of [this.child.stdout!, this.child.stderr!]) stream.on('data', (data: Buffer) => { this.said += data.toString(); });
     this.child.on('exit', () => { this.ended = true; });
     const ready = () => fetch(`${this.url}healthz`).then(answer => answer.ok, () => false);
-    await until(async () => this.ended || (await ready()), Boolean, 'emberlockd answers', 60);
+    await until(async () => this.ended || (await ready()), Boolean, 'emberlockd answers');
     if (this.ended) throw new Error(`emberlockd ended: ${this.said}`);
   }
 
@@ -101,7 +101,7 @@ console = "${console}"
   async end(): Promise<void> {
     if (!this.child || this.ended) return;
     this.child.kill('SIGTERM');
-    await until(() => this.ended, Boolean, 'emberlockd ended', 20).catch(() => this.kill());
+    await until(() => this.ended, Boolean, 'emberlockd ended').catch(() => this.kill());
   }
 
   async stop(): Promise<void> {

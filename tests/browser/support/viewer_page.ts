@@ -6,6 +6,7 @@ import {deflateSync} from 'node:zlib';
 
 import type {Browser, Page} from 'playwright-core';
 
+import {kHangGuard} from './chromium';
 import {type Channel, type Contents, type Frame, kBrick, type Triple, type View} from '../../../daemon/console/src/viewer/contents';
 
 export const kViewer = process.env.EMBERLOCK_CONSOLE ?? fileURLToPath(new URL('../../../build/release/console', import.meta.url));
@@ -61,12 +62,13 @@ ${blocks.map(block => `<script type="application/octet-stream" class="emberlock-
 /** Opens a page from the disk and waits for its first picture; what the browser complains of, and what is asked of any server, is kept. */
 export async function openFile(browser: Browser, path: string, search = '', size = {width: 1280, height: 900}): Promise<{page: Page; complaints: string[]}> {
   const page = await (await browser.newContext({viewport: size, acceptDownloads: true})).newPage();
+  page.setDefaultTimeout(1000 * kHangGuard);
   const complaints: string[] = [];
   page.on('pageerror', error => complaints.push(`script: ${error.message}`));
   page.on('console', message => { if (message.type() === 'error') complaints.push(message.text()); });
   page.on('request', request => { if (!/^(file|data|blob):/.test(request.url())) complaints.push(`asks elsewhere: ${request.url()}`); });
   await page.goto(pathToFileURL(path).href + search);
-  await page.waitForFunction(() => 'emberlockViewer' in window || document.querySelector('.fault:not([hidden])') !== null, undefined, {timeout: 60_000});
+  await page.waitForFunction(() => 'emberlockViewer' in window || document.querySelector('.fault:not([hidden])') !== null);
   return {page, complaints};
 }
 

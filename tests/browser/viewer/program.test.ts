@@ -20,7 +20,7 @@ let browser: Browser;
 beforeAll(async () => {
   emberlock('simulate', 'flame', '--out', join(folder, 'flame'), '--frames', '1', '--cells', '16', '--image', '64x64', '--rig', 'virtual:3');
   browser = await startChromium();
-}, 120_000);
+});
 afterAll(async () => {
   await browser.close();
   rmSync(folder, {recursive: true});

@@ -72,7 +72,7 @@ test('pictures of both agree within a grey level', async context => {
     await gpu.page.context().close();
     await gl.page.context().close();
   }
-}, 120_000);
+});
 
 test('where the device is lost it goes on by WebGL', async context => {
   const {page, complaints} = await byWebGpu(context);

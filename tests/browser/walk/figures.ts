@@ -35,7 +35,7 @@ export async function frameToScreen(page: Page, cameras: number, many: number): 
     }
     return [...seen.values()].map(times => times.size);
   };
-  await until(read, sizes => sizes.length === cameras && Math.min(...sizes) >= many, `${many} pictures of each camera`, 100);
+  await until(read, sizes => sizes.length === cameras && Math.min(...sizes) >= many, `${many} pictures of each camera`);
   const lists = [...seen.values()].map(times => [...times].map(([came, at]) => ({came, at})));
   return {
     seen: lists.flat().length,

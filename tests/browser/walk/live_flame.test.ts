@@ -16,7 +16,7 @@ import {number} from '../support/shown';
 const kBuild = fileURLToPath(new URL('../../../build/release', import.meta.url));
 const kConsole = process.env.EMBERLOCK_CONSOLE ?? `${kBuild}/console`;
 const kBin = process.env.EMBERLOCK_BIN ?? `${kBuild}/bin`;
-const kSeconds = 60;  // of the recording
+const kSeconds = 120;  // of the recording: a busy machine takes its time until the flame is shown
 
 const daemon = new Daemon();
 const figures: Record<string, string> = {};
@@ -46,7 +46,7 @@ beforeAll(async () => {
     if (header.kind === 'picture') came.push({header, jpeg});
   }));
   await page.goto(daemon.link());
-}, 300_000);
+});
 afterEach(({task}) => { failed ||= task.result?.state === 'fail'; });
 afterAll(async () => {
   if (failed && page) await screenshot(page, 'failed');
@@ -74,8 +74,8 @@ async function flameIn(jpeg: Uint8Array): Promise<{count: number; x: number; low
 }
 
 test('before: the camera is live, as it films', async () => {
-  await page.locator('.tile[data-camera=hand]').click({timeout: 20_000});
-  await until(() => came.length, pictures => pictures > 3, 'pictures come', 20);
+  await page.locator('.tile[data-camera=hand]').click();
+  await until(() => came.length, pictures => pictures > 3, 'pictures come');
   expect((await flameIn(came.at(-1)!.jpeg)).count).toBe(0);
 });
 
@@ -86,10 +86,9 @@ test('the flame stands on the marker, and follows it', async () => {
   await page.getByLabel('Flame’s size').fill('0.5');
   await screenshot(page, 'live-flame-form');
   await page.getByRole('button', {name: 'Show the flame'}).click();
-  await until(told, words => words.includes('Marker found'), 'the marker is found', 40);
-  await new Promise(resolve => setTimeout(resolve, 1000));
+  await until(told, words => words.includes('Marker found'), 'the marker is found');
   came.length = 0;
-  await until(() => came.length, pictures => pictures > 60, 'pictures come', 30);
+  await until(() => came.length, pictures => pictures > 36, 'pictures come');
   const places: [number, number][] = [];
   for (const {header, jpeg} of came.filter((_, at) => at % 6 === 0)) {
     const flame = await flameIn(jpeg);
@@ -112,26 +111,25 @@ test('the flame stands on the marker, and follows it', async () => {
   expect(seen.count).toBeGreaterThan(300);
   expect(seen.width).toBe(640);
   await screenshot(page, 'live-flame');
-}, 120_000);
+});
 
 test('how fast, and how late', async () => {
-  await new Promise(resolve => setTimeout(resolve, 6000));
+  await until(async () => number((await told()).split('·')[1] ?? ''), rate => rate > 0, 'its rate is known');
   const {ar} = await daemon.status();
   const shown = await page.evaluate(() => window.emberlockDiagnostics.summary());
   figures['pictures with the flame'] = `${ar!.rate_hz.toFixed(1)} a second, ${(1000 * ar!.delay_s).toFixed(0)} ms after their frame came; residual ${ar!.residual_px.toFixed(3)} px`;
   figures['on the screen'] = `${shown.fps_mean.toFixed(1)} a second, frame to screen ${shown.latency_median_ms.toFixed(0)} ms (95 %: ${shown.latency_p95_ms.toFixed(0)} ms)`;
-  expect(number((await told()).split('·')[1]!)).toBeGreaterThan(0);
-}, 30_000);
+});
 
 test('another marker is asked for: the page says what lies there instead', async () => {
   await page.getByRole('button', {name: 'Stop the flame'}).click();
   await page.getByLabel('Dictionary').selectOption('5X5_50');
   await page.getByRole('button', {name: 'Show the flame'}).click();
-  await until(told, words => words.includes('instead there is a marker of 4X4_50, number 7'), 'it is named', 60);
+  await until(told, words => words.includes('instead there is a marker of 4X4_50, number 7'), 'it is named');
   await page.getByRole('button', {name: 'Stop the flame'}).click();
   await until(() => page.locator('.live-flame .told').isVisible(), shown => !shown, 'it has ended');
   came.length = 0;
-  await until(() => came.length, pictures => pictures > 3, 'pictures come', 20);
+  await until(() => came.length, pictures => pictures > 3, 'pictures come');
   expect((await flameIn(came.at(-1)!.jpeg)).count, 'plain again').toBe(0);
   expect(watched.complaints).toEqual([]);
-}, 120_000);
+});

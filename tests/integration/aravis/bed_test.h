@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <algorithm>
 #include <cstdlib>
 #include <future>
 #include <memory>
@@ -13,6 +14,7 @@
 #include "drivers/aravis/aravis_driver.h"
 #include "tests/integration/aravis/fake_cameras.h"
 #include "tests/integration/aravis/film.h"
+#include "tests/support/wait.h"
 
 namespace emberlock::testing_support {
 
@@ -44,7 +46,9 @@ class AravisBed : public ::testing::Test {
       all.push_back(
           std::make_unique<FakeCamera>(first_host + i, prefix + std::to_string(i + 1), lost_per_thousand));
     }
-    clock.sleep_until(clock.now() + milliseconds(300));  // they bind their sockets
+    EXPECT_TRUE(test::wait_until([&] {
+      return std::all_of(all.begin(), all.end(), [](const auto& fake) { return fake->listens(); });
+    }));
     return all;
   }
 

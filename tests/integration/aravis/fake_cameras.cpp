@@ -2,6 +2,7 @@
 #include "tests/integration/aravis/fake_cameras.h"
 
 #include <csignal>
+#include <cstdio>
 #include <cstdlib>
 #include <fstream>
 #include <regex>
@@ -89,6 +90,15 @@ void FakeCamera::kill() {
 
 void FakeCamera::freeze() const { ::kill(pid_, SIGSTOP); }
 void FakeCamera::thaw() const { ::kill(pid_, SIGCONT); }
+
+bool FakeCamera::listens() const {
+  char bound[16];  // as the kernel lists 127.0.0.HOST, port 3956
+  std::snprintf(bound, sizeof bound, "%02X00007F:0F74", static_cast<unsigned>(host_));
+  std::ifstream in("/proc/net/udp");
+  for (std::string line; std::getline(in, line);)
+    if (line.find(bound) != std::string::npos) return true;
+  return false;
+}
 
 FakeCamera::Sent FakeCamera::sent() const {
   static const std::regex sent("Send frame (\\d+)"), kept("Drop GVSP .*frame: ?(\\d+)");

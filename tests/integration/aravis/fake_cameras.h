@@ -33,6 +33,8 @@ class FakeCamera {
   void freeze() const;  ///< neither sends nor answers, as a camera that hangs
   void thaw() const;
 
+  /// Whether it has bound its control port.
+  [[nodiscard]] bool listens() const;
   /// What it says that it sent since it was started last, in order; those of which it kept a packet back.
   struct Sent {
     std::vector<std::uint64_t> frames;

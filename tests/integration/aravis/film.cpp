@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "tests/integration/aravis/film.h"
 
+#include "tests/support/wait.h"
+
 namespace emberlock::testing_support {
 namespace {
 
@@ -36,11 +38,12 @@ void look_at(const Frame& frame, Film& film) {
   film.last = frame.stamp;
 }
 
-Film film_for(drivers::Camera& camera, Seconds time) {
+Film film_for(drivers::Camera& camera, Seconds time, std::uint64_t at_least) {
   const SteadyClock clock;
   const TimePoint until = clock.now() + time;
+  const TimePoint hangs = until + Seconds(static_cast<double>(test::kHangGuard.count()));
   Film film;
-  while (clock.now() < until) {
+  while (clock.now() < until || (film.frames < at_least && clock.now() < hangs)) {
     const auto frame = camera.next_frame(milliseconds(200));
     if (frame) {
       look_at(*frame, film);

@@ -25,8 +25,8 @@ struct Film {
 /// Looks at one frame.
 void look_at(const Frame& frame, Film& film);
 
-/// Takes frames for so long, or until the camera says `device`.
-Film film_for(drivers::Camera& camera, Seconds time);
+/// Takes frames for so long, and until so many have come, or until the camera says `device`.
+Film film_for(drivers::Camera& camera, Seconds time, std::uint64_t at_least = 0);
 
 /// Tries to start it until it does or so much time has passed; the last error then.
 Status start_within(drivers::Camera& camera, Seconds time);

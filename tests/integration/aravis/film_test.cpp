@@ -33,6 +33,7 @@ std::uint64_t all_of(const drivers::FrameCounts& counts) {
 // EMBERLOCK_ARAVIS_SECONDS=60 for the figure.
 TEST_F(FilmTest, ElevenCamerasFilmWithoutAFrameUnaccountedFor) {
   const auto time = Seconds(asked_for("EMBERLOCK_ARAVIS_SECONDS", 3));
+  const auto most = static_cast<std::uint64_t>(0.9 * 15 * time.value());  // on a busy machine they come late
   const auto processes = fakes(11, "ELEVEN");
   auto cameras = open_all(processes, small_film());
   ASSERT_EQ(cameras.size(), 11U);
@@ -42,7 +43,7 @@ TEST_F(FilmTest, ElevenCamerasFilmWithoutAFrameUnaccountedFor) {
   {
     std::vector<std::jthread> owners;
     for (std::size_t i = 0; i < cameras.size(); ++i) {
-      owners.emplace_back([&, i] { films[i] = film_for(*cameras[i], time); });
+      owners.emplace_back([&, i] { films[i] = film_for(*cameras[i], time, most + 1); });
     }
   }
   const Seconds cpu = cpu_time() - cpu_before;
@@ -59,7 +60,7 @@ TEST_F(FilmTest, ElevenCamerasFilmWithoutAFrameUnaccountedFor) {
     EXPECT_LE(films[i].skipped, counts.lost());  // the first frame may find a small socket
     EXPECT_EQ(films[i].wrong_pixels, 0U);
     EXPECT_EQ(films[i].wrong_number, 0U);
-    EXPECT_GT(static_cast<double>(films[i].frames), 0.9 * 15 * time.value());
+    EXPECT_GT(films[i].frames, most);
     EXPECT_FALSE(films[i].error.has_value());
     lost += counts.lost();
     sent += its;
@@ -119,7 +120,7 @@ TEST_F(FilmTest, WhoTakesNoFramesFindsTheOverflowCountedAsUnderrun) {
   auto camera = driver.open("SLOW1", request);
   ASSERT_TRUE(camera.ok()) << camera.error().message();
   ASSERT_TRUE((*camera)->start().ok());
-  clock.sleep_until(clock.now() + Seconds(2));  // 200 frames, 101 buffers
+  ASSERT_TRUE(test::wait_until([&] { return processes[0]->sent().frames.size() > 200; }));  // for 101 buffers
   const Film film = film_for(**camera, milliseconds(500));
   (*camera)->stop();
   const drivers::FrameCounts counts = (*camera)->counts();

@@ -11,6 +11,7 @@
 #include <unistd.h>
 
 #include "tests/integration/aravis/bed_test.h"
+#include "tests/support/wait.h"
 
 namespace emberlock {
 namespace {
@@ -111,9 +112,7 @@ TEST_F(FindAndSetUp, ACameraThatAnotherProgramHasNamesThatProgram) {
     ::execlp("arv-camera-test-0.8", "arv-camera-test-0.8", "-n", "Aravis-Fake-TAKEN1", nullptr);
     ::_exit(127);
   }
-  const TimePoint until = clock.now() + Seconds(5);
-  while (cameras[0]->sent().frames.empty() && clock.now() < until)
-    clock.sleep_until(clock.now() + milliseconds(50));
+  EXPECT_TRUE(test::wait_until([&] { return !cameras[0]->sent().frames.empty(); }));
   const auto found = driver.find();
   const auto opened = driver.open("TAKEN1", small_film());
   ::kill(other, SIGKILL);

@@ -31,8 +31,7 @@ TEST_F(LossTest, ACameraThatDiesIsReportedPickedUpAgainAndHarmsNoOther) {
   std::vector<std::jthread> owners;
   for (std::size_t i = 0; i < 2; ++i) {
     owners.emplace_back([&, i] {
-      const TimePoint until = clock.now() + Seconds(60);
-      while (!done && clock.now() < until) {
+      while (!done) {
         const auto frame = cameras[i]->next_frame(milliseconds(500));
         if (!frame) {
           others[i].error = frame.error();
@@ -84,9 +83,11 @@ TEST_F(LossTest, ACameraThatDiesIsReportedPickedUpAgainAndHarmsNoOther) {
   EXPECT_EQ(frame->image->layout(), (ImageLayout{{640, 480}, PixelFormat::gray8, 8}));
   EXPECT_EQ(killed.info().frame_rate.value(), cameras[0]->info().frame_rate.value());
   EXPECT_GE(frame->stamp.frame_id, before.last->frame_id + 1);  // numbers go on
-  const Film after = film_for(killed, Seconds(2));
+  const TimePoint again = clock.now();
+  const Film after = film_for(killed, Seconds(2), 26);
   EXPECT_EQ(after.wrong_pixels, 0U);  // the exposure too is as it was
-  EXPECT_NEAR(static_cast<double>(after.frames), 30, 4);
+  EXPECT_GE(after.frames, 26U);
+  EXPECT_LE(static_cast<double>(after.frames), 15 * (after.ended - again).value() + 4);
   // The frame that the kill tore, and a first one that found a small socket.
   EXPECT_LE(killed.counts().lost(), counts_before.lost() + 2);
 
@@ -145,7 +146,7 @@ TEST_F(LossTest, StoppingACameraThatHangsIsBounded) {
   before = clock.now();
   cameras[0].reset();
   EXPECT_LE((clock.now() - before).value(), drivers::kCallDeadline.value());
-  const Film other = film_for(*cameras[1], Seconds(1));
+  const Film other = film_for(*cameras[1], Seconds(1), 13);
   EXPECT_GE(other.frames, 13U);
   EXPECT_EQ(other.skipped, 0U);
   processes[0]->thaw();

@@ -68,14 +68,11 @@ TEST_F(Daemon, StaggeredCamerasAreLockedAndTheRecordingTellsTheirPlaces) {
   SmallDaemon daemon(small_config(temp_.path()));
   v1::AlignRequest request;
   request.set_stagger(true);
-  ASSERT_TRUE(daemon.conductor->align(request).ok());
-  ASSERT_TRUE(daemon.reach(v1::LOCKED)) << daemon.conductor->status().reason();
+  ASSERT_TRUE(daemon.locks(request));
   const v1::AlignmentStatus lock = daemon.conductor->status().alignment();
   EXPECT_TRUE(lock.staggered());
   EXPECT_THAT(lock.reason(), HasSubstr("its own instant"));
-  v1::RecordRequest take;
-  take.set_name("staggered");
-  ASSERT_TRUE(daemon.conductor->record(take).ok());
+  ASSERT_TRUE(daemon.record("staggered", 0, false).ok());
   ASSERT_TRUE(daemon.work_until([&] { return daemon.conductor->status().recording().frames() > 8; }));
   ASSERT_TRUE(daemon.conductor->stop_recording().ok());
   ASSERT_TRUE(daemon.reach(v1::LOCKED));
@@ -145,8 +142,7 @@ TEST_F(Daemon, SlowCamerasAreLockedToo) {
     config.rig.virtual_rig.draw.seed = seed;
     config.alignment.run.comb_frames = 24;
     SmallDaemon daemon(std::move(config));
-    ASSERT_TRUE(daemon.conductor->align({}).ok());
-    ASSERT_TRUE(daemon.reach(v1::LOCKED)) << seed << ": " << daemon.conductor->status().reason();
+    ASSERT_TRUE(daemon.locks()) << seed;
     const double tolerance = daemon.conductor->status().alignment().tolerance_s();
     EXPECT_LE(true_spread(*daemon.rig->virtual_rig()).value(), 2 * tolerance);
   }
@@ -174,8 +170,7 @@ TEST_F(Daemon, PicturesAreToldWhereLampDotAndTargetAre) {
 
 TEST_F(Daemon, HeldForAnHourItIsNeverOutUnnoticed) {
   SmallDaemon daemon(small_config(temp_.path()));
-  ASSERT_TRUE(daemon.conductor->align({}).ok());
-  ASSERT_TRUE(daemon.reach(v1::LOCKED));
+  ASSERT_TRUE(daemon.locks());
   const TimePoint from = daemon.rig->clock().now();
   // Two cameras may lie a tolerance to either side, each as well as flashes shorter than a row tell: to half
   // a one.
@@ -193,12 +188,8 @@ TEST_F(Daemon, HeldForAnHourItIsNeverOutUnnoticed) {
 
 TEST_F(Daemon, ALockedRecordingIsWholeAndTheLockIsCheckedAfterIt) {
   SmallDaemon daemon(small_config(temp_.path()));
-  ASSERT_TRUE(daemon.conductor->align({}).ok());
-  ASSERT_TRUE(daemon.reach(v1::LOCKED));
-  v1::RecordRequest request;
-  request.set_name("take 1");
-  request.set_seconds(2);
-  ASSERT_TRUE(daemon.conductor->record(request).ok());
+  ASSERT_TRUE(daemon.locks());
+  ASSERT_TRUE(daemon.record("take 1", 2, false).ok());
   EXPECT_EQ(daemon.conductor->phase(), v1::CAPTURING);
   const v1::StrobeState dark = *daemon.conductor->strobe();
   EXPECT_THAT(dark.code(), ElementsAre(false));  // its time base goes on
@@ -257,11 +248,7 @@ TEST_F(Daemon, WhatCannotBeDoneNowIsRefusedWithARemedy) {
 TEST_F(Daemon, AWholeRecordingReplaysThroughItBitForBit) {
   {
     SmallDaemon live(small_config(temp_.path()));
-    v1::RecordRequest request;
-    request.set_name("live");
-    request.set_unlocked(true);
-    request.set_seconds(3);
-    ASSERT_TRUE(live.conductor->record(request).ok());
+    ASSERT_TRUE(live.record("live", 3).ok());
     ASSERT_TRUE(live.reach(v1::IDLE));
   }
   rig::DaemonConfig config = small_config(temp_.path());
@@ -272,10 +259,7 @@ TEST_F(Daemon, AWholeRecordingReplaysThroughItBitForBit) {
   config.rig.replay_session = temp_.path() / "sessions" / "live";
   config.rig.strobe.source = rig::StrobeSource::replay;
   SmallDaemon again(config);
-  v1::RecordRequest request;
-  request.set_name("again");
-  request.set_unlocked(true);
-  ASSERT_TRUE(again.conductor->record(request).ok());
+  ASSERT_TRUE(again.record("again").ok());
   ASSERT_TRUE(again.reach(v1::IDLE));
   EXPECT_EQ(again.conductor->status().recording().state(), v1::RecordingStatus::COMPLETE)
       << again.conductor->status().recording().verdict();
@@ -306,16 +290,13 @@ TEST_F(Daemon, TheLockHoldsAsLongAsItIsSaidTo) {
     rig::DaemonConfig config = small_config(temp_ / std::to_string(seed));
     config.rig.virtual_rig.draw.seed = seed;
     SmallDaemon daemon(std::move(config));
-    ASSERT_TRUE(daemon.conductor->align({}).ok());
-    ASSERT_TRUE(daemon.reach(v1::LOCKED)) << daemon.conductor->status().reason();
+    ASSERT_TRUE(daemon.locks());
     const v1::DaemonStatus status = daemon.conductor->status();
     const double sure = status.alignment().time_left_s();
     EXPECT_GE(sure, 10) << "a lock is called good when it holds for a take";
     EXPECT_GE(status.alignment().likely_left_s(), sure);
     EXPECT_THAT(status.next_step(), HasSubstr("Record: a take may be "));
-    v1::RecordRequest request;
-    request.set_seconds(sure - 1);
-    ASSERT_TRUE(daemon.conductor->record(request).ok());
+    ASSERT_TRUE(daemon.record("", sure - 1, false).ok());
     ASSERT_TRUE(daemon.reach(v1::LOCKED, 100'000));
     EXPECT_EQ(daemon.fault(v1::Fault::LOCK_LOST), nullptr) << seed;
   }
@@ -328,16 +309,12 @@ TEST_F(Daemon, NoCamerasTrulyLieFartherApartBeforeThePromiseIsOverAndTwiceThatWo
     config.rig.virtual_rig.draw.seed = seed;
     config.rig.virtual_rig.draw.crystal_spread = PartsPerMillion(60);
     SmallDaemon daemon(std::move(config));
-    ASSERT_TRUE(daemon.conductor->align({}).ok());
-    ASSERT_TRUE(daemon.reach(v1::LOCKED)) << daemon.conductor->status().reason();
+    ASSERT_TRUE(daemon.locks());
     const v1::AlignmentStatus lock = daemon.conductor->status().alignment();
     drivers::VirtualRig& rig = *daemon.rig->virtual_rig();
     const TimePoint locked = rig.clock().now();
     // Nothing is reset during a recording.
-    v1::RecordRequest request;
-    request.set_seconds(2 * lock.time_left_s());
-    request.set_unlocked(true);
-    ASSERT_TRUE(daemon.conductor->record(request).ok());
+    ASSERT_TRUE(daemon.record("", 2 * lock.time_left_s()).ok());
     std::optional<Seconds> left;
     ASSERT_TRUE(daemon.work_until(
         [&] {
@@ -356,8 +333,7 @@ TEST_F(Daemon, ATakeThatIsLongerThanTheLockIsRefusedUntilTheLockIsRenewedForIt) 
   rig::DaemonConfig config = small_config(temp_.path());
   config.rig.virtual_rig.draw.crystal_spread = PartsPerMillion(60);
   SmallDaemon daemon(std::move(config));
-  ASSERT_TRUE(daemon.conductor->align({}).ok());
-  ASSERT_TRUE(daemon.reach(v1::LOCKED)) << daemon.conductor->status().reason();
+  ASSERT_TRUE(daemon.locks());
   // Until the drifts have used up most of it.
   ASSERT_TRUE(daemon.work_until([&] {
     const v1::DaemonStatus status = daemon.conductor->status();
@@ -452,8 +428,7 @@ TEST_F(DaemonAtTheFlame, ItBurnsWhileNothingIsAlignedSoThatCamerasCanBeExposedFo
   drivers::Camera& camera = daemon.rig->camera(0);
   static_cast<void>(camera.next_frame(Seconds(1)));
   EXPECT_GT(seen(*camera.next_frame(Seconds(1))->image).bright, 500);
-  ASSERT_TRUE(daemon.conductor->align({}).ok());
-  ASSERT_TRUE(daemon.reach(v1::LOCKED)) << daemon.conductor->status().reason();
+  ASSERT_TRUE(daemon.locks());
   EXPECT_LT(seen(*camera.next_frame(Seconds(1))->image).bright, 500);
 }
 
@@ -492,8 +467,7 @@ TEST_F(DaemonAtTheFlame, RecordingsForAlignmentShowTheStrobeAndOthersTheFlame) {
   EXPECT_LT(idle.bright, 500);
   EXPECT_GT(idle.saturated, 20) << "the lamp";
   EXPECT_EQ(daemon.conductor->strobe()->output(), v1::StrobeState::OFF) << "it flashed for that alone";
-  ASSERT_TRUE(daemon.conductor->align({}).ok());
-  ASSERT_TRUE(daemon.reach(v1::LOCKED)) << daemon.conductor->status().reason();
+  ASSERT_TRUE(daemon.locks());
   record(daemon, "locked strobe", "alignment");
   EXPECT_GT(recorded("locked strobe").saturated, 20);
   record(daemon, "locked flame", "flame");

@@ -23,8 +23,6 @@ namespace fs = std::filesystem;
 using testing::HasSubstr;
 using Live = v1::LiveStatus;
 
-constexpr std::chrono::minutes kPatience{4};
-
 class LiveVolumesProgramTest : public testing::Test {
  protected:
   LiveVolumesProgramTest() {
@@ -45,7 +43,7 @@ class LiveVolumesProgramTest : public testing::Test {
     auto engine = daemon::Engine::start(config_, board_);
     ASSERT_TRUE(engine.ok()) << engine.error().message();
     engine_ = std::move(*engine);
-    ASSERT_TRUE(test::wait_until([&] { return board_.status()->phase() == v1::IDLE; }, kPatience));
+    ASSERT_TRUE(test::wait_until([&] { return board_.status()->phase() == v1::IDLE; }));
   }
   static v1::RecordRequest take(const std::string& name, std::optional<v1::LiveRequest> live) {
     v1::RecordRequest request;
@@ -62,7 +60,7 @@ class LiveVolumesProgramTest : public testing::Test {
   }
   [[nodiscard]] Live status() const { return board_.status()->live(); }
   bool until(const std::function<bool(const Live&)>& condition) {
-    return test::wait_until([&] { return condition(status()); }, kPatience);
+    return test::wait_until([&] { return condition(status()); });
   }
   /// Records with live volumes until that holds, and goes on recording. Where the machine is so busy that
   /// they give way for good, again.
@@ -128,17 +126,16 @@ class LiveVolumesProgramTest : public testing::Test {
 TEST_F(LiveVolumesProgramTest, VolumesComeWhileItIsRecordedAndCostItNothing) {
   start();
   ASSERT_TRUE(engine_->record(take("without", {})).ok());
-  ASSERT_TRUE(test::wait_until([&] { return board_.status()->recording().frames() > 60; }, kPatience));
+  ASSERT_TRUE(test::wait_until([&] { return board_.status()->recording().frames() > 60; }));
   EXPECT_FALSE(board_.status()->has_live());
   stop_recording();
 
-  record_until(live(), [](const Live& now) { return now.volumes() >= 3; });
+  record_until(live(), [](const Live& now) { return now.volumes() >= 3 && now.keeps_up(); });
   EXPECT_EQ(board_.status()->phase(), v1::CAPTURING) << "while it is recorded";
   const Live running = status();
   EXPECT_GT(running.delay_s(), 0);
   EXPECT_GT(running.takes_s(), 0);
   EXPECT_EQ(running.device(), "cpu");
-  EXPECT_TRUE(running.keeps_up());
   const auto shown = board_.iterations(0);
   ASSERT_EQ(shown.size(), 1U) << "the newest alone";
   EXPECT_EQ(shown.back()->reconstruction(), running.session() + " live");
@@ -156,10 +153,10 @@ TEST_F(LiveVolumesProgramTest, VolumesComeWhileItIsRecordedAndCostItNothing) {
 
 TEST_F(LiveVolumesProgramTest, OneThatCannotKeepUpIsOvertakenAndSaysWhatWouldHold) {
   start();
-  record_until(live(1, 64), [](const Live& now) { return now.volumes() >= 2 && !now.keeps_up(); });
+  record_until(live(1, 64),
+               [](const Live& now) { return now.volumes() >= 2 && !now.keeps_up() && now.skipped() > 0; });
   const Live slow = status();
   EXPECT_EQ(slow.voxels(), 64U);
-  EXPECT_GT(slow.skipped(), 0U);
   EXPECT_GT(slow.holds_every(), 1U);
   if (slow.state() == Live::RUNNING) {
     EXPECT_THAT(slow.reason(), HasSubstr("--every"));
@@ -169,14 +166,13 @@ TEST_F(LiveVolumesProgramTest, OneThatCannotKeepUpIsOvertakenAndSaysWhatWouldHol
 
 TEST_F(LiveVolumesProgramTest, AChildThatIsKilledIsToldAndTheRecordingGoesOn) {
   start();
-  record_until(live(2, 16), [](const Live& now) { return now.volumes() >= 1; });
-  const pid_t pid = child();
-  ASSERT_GT(pid, 0);
+  pid_t pid = 0;
+  record_until(live(2, 16), [&](const Live& now) { return now.volumes() >= 1 && (pid = child()) > 0; });
   ASSERT_EQ(::kill(pid, SIGKILL), 0);
   ASSERT_TRUE(until([](const Live& now) { return now.state() == Live::FAILED; }));
   EXPECT_THAT(status().reason(), HasSubstr("was killed"));
   const std::uint64_t then = board_.status()->recording().frames();
-  ASSERT_TRUE(test::wait_until([&] { return board_.status()->recording().frames() > then + 40; }, kPatience));
+  ASSERT_TRUE(test::wait_until([&] { return board_.status()->recording().frames() > then + 40; }));
   EXPECT_EQ(board_.status()->phase(), v1::CAPTURING);
   stop_recording();
 }

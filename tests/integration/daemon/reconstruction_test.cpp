@@ -168,7 +168,8 @@ TEST_F(DaemonReconstruction, AFrameIsEditedWhileItGoesOnAndReplaysToTheSameBits)
   wait_for([&] { return child_->status()->stylization().pauses(); });
   const std::uint32_t passes = child_->status()->stylization().passes();
   EXPECT_GT(passes, 0U) << "it went on, and waits";
-  EXPECT_EQ(board_.iterations(0).back()->stylization().passes(), passes);
+  EXPECT_TRUE(test::wait_until([&] { return board_.iterations(0).back()->stylization().passes() == passes; }))
+      << "behind the status";
   ASSERT_TRUE(edit(R"({"op": "cut", "region": {"center": [0, 0, 0], "size": [0.1, 0.1, 0.02]}})").ok());
   ASSERT_TRUE(child_->finish().ok());
   wait_for([] { return false; });

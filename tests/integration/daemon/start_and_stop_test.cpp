@@ -5,8 +5,8 @@
 #include <chrono>
 #include <csignal>
 #include <cstring>
-#include <fstream>
 #include <mutex>
+#include <optional>
 #include <string>
 #include <thread>
 #include <vector>
@@ -20,13 +20,7 @@
 
 #include "base/unique_fd.h"
 #include "session/camera_reader.h"
-#include "session/files.h"
-#include "session/verify.h"
-#include "tests/support/daemon_program.h"
 #include "tests/support/daemon_test.h"
-#include "tests/support/recording.h"
-#include "tests/support/shell.h"
-#include "tests/support/wait.h"
 
 namespace emberlock {
 namespace {
@@ -86,31 +80,26 @@ class NotifySocket {
 
 class StartAndStop : public test::DaemonTest {
  protected:
-  StartAndStop() : systemd_(temp_ / "notify") {
-    std::ofstream(config())
-        << "[rig]\nname = \"test\"\n[[rig.camera]]\ndriver = \"virtual\"\ncount = 2\nsize = \"160x120\"\n"
-        << "[rig.strobe]\ndriver = \"none\"\n[recording]\nfolder = \"" << sessions().string()
-        << "\"\nfree_space_floor_mib = 0\nencoding = \"raw\"\ntranscode = \"never\"\nqueue_s = 60\nqueue_mib "
-           "= 1024\n"
-        << "[server]\nsocket = \"" << (temp_ / "run" / "d.sock").string() << "\"\nhttp_listen = \"\"\n";
-  }
-  using Environment = std::vector<std::pair<std::string, std::string>>;
-  [[nodiscard]] Environment environment(Environment more = {}) const {
+  StartAndStop()
+      : DaemonTest({.cameras = 2,
+                    .size = "160x120",
+                    .strobe = "none",
+                    .recording = "queue_s = 60\nqueue_mib = 1024\n"}),
+        systemd_(temp_ / "notify") {}
+  [[nodiscard]] test::Environment environment(test::Environment more = {}) const {
     more.emplace_back("NOTIFY_SOCKET", systemd_.path());
     return more;
   }
-  /// With a disk that takes so many ms for each frame.
-  [[nodiscard]] Environment slow_disk(int ms) const {
 #ifdef SLOW_DISK_LIBRARY
+  /// With a disk that takes so many ms for each frame, and takes none while the file disk_is_stuck() exists.
+  [[nodiscard]] test::Environment slow_disk(int ms) const {
     return environment({{"LD_PRELOAD", SLOW_DISK_LIBRARY},
                         {"EMBERLOCK_SLOW_DISK_MS", std::to_string(ms)},
-                        { "WATCHDOG_USEC",
-                          "2000000" }});
-#else
-    static_cast<void>(ms);
-    return environment();
-#endif
+                        {"EMBERLOCK_SLOW_DISK_STUCK", disk_is_stuck()},
+                        {"WATCHDOG_USEC", "2000000"}});
   }
+  [[nodiscard]] std::string disk_is_stuck() const { return (temp_ / "stuck").string(); }
+#endif
   /// Eleven cameras of 65 s in a segment each, as a recorder that was killed leaves them.
   void leave_unfinished(const std::string& session, ImageSize size = {32, 24}) const {
     const ImageLayout layout{size, PixelFormat::gray8, 8};
@@ -131,17 +120,15 @@ class StartAndStop : public test::DaemonTest {
       std::filesystem::copy(folder / "cam0", other);
     }
   }
-  static std::size_t frames_in(const std::filesystem::path& session, const std::string& camera) {
-    const auto index = session::read_index(session, camera);
-    return index.ok() ? index->records.size() : 0;
-  }
 
   NotifySocket systemd_;
 };
 
-TEST_F(StartAndStop, ItIsReadyBeforeElevenLongSegmentsAreSalvaged) {
+using StartAndStopSlow = StartAndStop;
+
+TEST_F(StartAndStopSlow, ItIsReadyBeforeElevenLongSegmentsAreSalvaged) {
   leave_unfinished("killed", {160, 120});
-  test::Program daemon(EMBERLOCKD_PROGRAM, config(), environment());
+  test::Program daemon(command(), environment());
   ASSERT_TRUE(systemd_.hears("READY=1"));
   // Decoding all frames takes twenty times as long. On a busy machine processor time says more than a clock.
   EXPECT_LT(daemon.processor_seconds(), 1);
@@ -149,7 +136,7 @@ TEST_F(StartAndStop, ItIsReadyBeforeElevenLongSegmentsAreSalvaged) {
   const v1::Manifest manifest = session::read_manifest(sessions() / "killed").value();
   for (const v1::CameraStream& camera : manifest.cameras()) {
     EXPECT_GT(camera.counts().recorded() + 60, kFramesLeft);
-    EXPECT_EQ(camera.counts().recorded(), frames_in(sessions() / "killed", camera.camera_id()));
+    EXPECT_EQ(camera.counts().recorded(), indexed_frames("killed", camera.camera_id()));
   }
   EXPECT_EQ(daemon.end(SIGTERM), 0);
 }
@@ -157,48 +144,45 @@ TEST_F(StartAndStop, ItIsReadyBeforeElevenLongSegmentsAreSalvaged) {
 TEST_F(StartAndStop, EndedOrKilledInMidSalvageTheNextStartGoesOnAndLosesNothing) {
   leave_unfinished("killed");
   for (const int signal : {SIGTERM, SIGKILL, SIGTERM, SIGKILL, SIGINT}) {
-    test::Program daemon(EMBERLOCKD_PROGRAM, config(), environment());
+    test::Program daemon(command(), environment());
     ASSERT_TRUE(systemd_.hears("READY=1"));
     EXPECT_EQ(daemon.end(signal), signal == SIGKILL ? -SIGKILL : 0);
   }
-  test::Program daemon(EMBERLOCKD_PROGRAM, config(), environment());
+  test::Program daemon(command(), environment());
   ASSERT_TRUE(answers("sessions list", "SALVAGED"));
-  const auto check = session::verify_session(sessions() / "killed");
-  ASSERT_TRUE(check.ok()) << check.error().message();
-  EXPECT_TRUE(check->whole()) << check->to_do;
-  for (const session::CameraCheck& camera : check->cameras) EXPECT_EQ(camera.good, check->cameras[0].good);
+  const session::SessionCheck check = expect_whole("killed");
+  for (const session::CameraCheck& camera : check.cameras) EXPECT_EQ(camera.good, check.cameras[0].good);
 }
 
 TEST_F(StartAndStop, ARecordingMayBeginWhileSalvageRunsWhichGoesOnAfterIt) {
   leave_unfinished("killed");
-  test::Program daemon(EMBERLOCKD_PROGRAM, config(), environment());
+  test::Program daemon(command(), environment());
   ASSERT_TRUE(systemd_.hears("READY=1"));
   ASSERT_TRUE(answers("status", "filming"));
   const Shell recorded = client("record take --unlocked --seconds 1");
   EXPECT_EQ(recorded.status, 0) << recorded.output;
   EXPECT_THAT(recorded.output, HasSubstr("none lost"));
   ASSERT_TRUE(answers("sessions list", "SALVAGED"));
-  EXPECT_TRUE(session::verify_session(sessions() / "killed")->whole());
+  expect_whole("killed");
 }
 
 #ifdef SLOW_DISK_LIBRARY
 TEST_F(StartAndStop, AskedToEndWithASlowDiskItAsksForTimeAsLongAsItGetsOnAndKeepsEveryFrame) {
-  test::Program daemon(EMBERLOCKD_PROGRAM, config(), slow_disk(100));
+  test::Program daemon(command(), slow_disk(100));
   ASSERT_TRUE(systemd_.hears("READY=1"));
   ASSERT_TRUE(answers("status", "filming"));
   std::thread recording([&] { static_cast<void>(client("record slow --unlocked")); });
-  ASSERT_TRUE(answers("status", "recording  slow"));
-  std::this_thread::sleep_for(std::chrono::seconds(2));
-  daemon.tell(SIGTERM);
+  // As many as the disk takes three seconds for.
+  EXPECT_TRUE(test::wait_until([&] {
+    return number(this->recording().value("progress", nlohmann::json::object()), "queued") > 2 * 30;
+  }));
+  daemon.send(SIGTERM);
   EXPECT_TRUE(systemd_.hears("STOPPING=1"));
   EXPECT_TRUE(systemd_.hears("EXTEND_TIMEOUT_USEC="));
   EXPECT_TRUE(systemd_.hears("EXTEND_TIMEOUT_USEC="));  // as it gets on
   EXPECT_EQ(daemon.wait(), 0);
   recording.join();
-  const auto check = session::verify_session(sessions() / "slow");
-  ASSERT_TRUE(check.ok()) << check.error().message();
-  EXPECT_EQ(check->state, v1::Manifest::COMPLETE);
-  EXPECT_TRUE(check->whole()) << check->to_do;
+  EXPECT_EQ(expect_whole("slow").state, v1::Manifest::COMPLETE);
   const auto manifest = session::read_manifest(sessions() / "slow").value();
   for (const v1::CameraStream& camera : manifest.cameras()) {
     EXPECT_GE(camera.counts().recorded(), 20U);
@@ -207,7 +191,8 @@ TEST_F(StartAndStop, AskedToEndWithASlowDiskItAsksForTimeAsLongAsItGetsOnAndKeep
 }
 
 TEST_F(StartAndStop, WhileASlowDiskIsWaitedForTheWatchdogIsFedAndCallsAreAnswered) {
-  test::Program daemon(EMBERLOCKD_PROGRAM, config(), slow_disk(200));
+  test::put_bytes(disk_is_stuck(), "");
+  test::Program daemon(command(), slow_disk(0));
   ASSERT_TRUE(systemd_.hears("READY=1"));
   ASSERT_TRUE(answers("status", "filming"));
   std::thread recording([&] {
@@ -215,44 +200,48 @@ TEST_F(StartAndStop, WhileASlowDiskIsWaitedForTheWatchdogIsFedAndCallsAreAnswere
     EXPECT_EQ(recorded.status, 0) << recorded.output;
     EXPECT_THAT(recorded.output, HasSubstr("none lost"));
   });
-  ASSERT_TRUE(answers("status", "finishing"));
+  EXPECT_TRUE(answers("status", "finishing"));
   systemd_.forget();
   EXPECT_TRUE(systemd_.hears("WATCHDOG=1"));
   EXPECT_TRUE(systemd_.hears("WATCHDOG=1"));
   EXPECT_THAT(client("record other --unlocked").output, HasSubstr("slow is being recorded"));
+  std::filesystem::remove(disk_is_stuck());
   recording.join();
 }
 
 TEST_F(StartAndStop, ASecondSignalEndsItAtOnceAndTheNextStartSalvagesAllThatReachedTheDisk) {
   {
-    test::Program daemon(EMBERLOCKD_PROGRAM, config(), slow_disk(500));
+    test::Program daemon(command(), slow_disk(500));
     ASSERT_TRUE(systemd_.hears("READY=1"));
     ASSERT_TRUE(answers("status", "filming"));
     std::thread recording([&] { static_cast<void>(client("record slow --unlocked")); });
-    ASSERT_TRUE(answers("status", "recording  slow"));
-    std::this_thread::sleep_for(std::chrono::seconds(3));
-    daemon.tell(SIGTERM);
+    EXPECT_TRUE(every_camera_has(1, "slow"));
+    test::put_bytes(disk_is_stuck(), "");
+    const auto begun = std::chrono::steady_clock::now();
+    daemon.send(SIGTERM);
     EXPECT_TRUE(systemd_.hears("STOPPING=1"));
-    daemon.tell(SIGTERM);  // passed on twice, by a wrapper
-    std::this_thread::sleep_for(std::chrono::milliseconds(800));
-    EXPECT_EQ(::kill(daemon.pid(), 0), 0);
-    EXPECT_EQ(daemon.end(SIGTERM), EXIT_FAILURE);
+    std::optional<int> status;
+    EXPECT_TRUE(test::wait_until([&] {
+      daemon.send(SIGTERM);
+      return (status = daemon.ended()).has_value();
+    }));
+    EXPECT_EQ(status, EXIT_FAILURE);
+    EXPECT_GE(std::chrono::steady_clock::now() - begun, std::chrono::milliseconds(500))
+        << "wrappers pass a signal on twice";
     recording.join();
+    std::filesystem::remove(disk_is_stuck());
   }
-  const auto session = sessions() / "slow";
-  const v1::Manifest left = session::read_manifest(session).value();
+  const v1::Manifest left = session::read_manifest(sessions() / "slow").value();
   EXPECT_EQ(left.state(), v1::Manifest::RECORDING);
   std::vector<std::size_t> indexed;
   for (const v1::CameraStream& camera : left.cameras())
-    indexed.push_back(frames_in(session, camera.camera_id()));
-  test::Program daemon(EMBERLOCKD_PROGRAM, config(), environment());
+    indexed.push_back(indexed_frames("slow", camera.camera_id()));
+  test::Program daemon(command(), environment());
   ASSERT_TRUE(answers("sessions list", "SALVAGED"));
-  const auto check = session::verify_session(session);
-  ASSERT_TRUE(check.ok()) << check.error().message();
-  EXPECT_TRUE(check->whole()) << check->to_do;
+  const session::SessionCheck check = expect_whole("slow");
   for (std::size_t i = 0; i < indexed.size(); ++i) {
     EXPECT_GT(indexed[i], 0U);
-    EXPECT_GE(check->cameras[i].good, indexed[i]) << "the index tells of a frame once it is written";
+    EXPECT_GE(check.cameras[i].good, indexed[i]) << "the index tells of a frame once it is written";
   }
 }
 #endif

@@ -2,6 +2,7 @@
 // `emberlock reconstruct`, `view` and `render` as they are started: exit codes, what stands on stdout,
 // Ctrl-C.
 #include <cmath>
+#include <csignal>
 #include <filesystem>
 #include <fstream>
 #include <string>
@@ -9,8 +10,10 @@
 #include <gmock/gmock.h>
 #include <nlohmann/json.hpp>
 
+#include "tests/support/program.h"
 #include "tests/support/recording.h"
 #include "tests/support/shell.h"
+#include "tests/support/wait.h"
 
 namespace emberlock {
 namespace {
@@ -57,6 +60,15 @@ class ReconstructProgram : public ::testing::Test {
     std::ifstream in(out_ / "report.json");
     return json::parse(in);
   }
+  /// What becomes of a command that Ctrl-C ends once it has printed these words.
+  [[nodiscard]] Shell interrupted(const std::string& words, const std::string& at) const {
+    const fs::path log = folder_ / "log";
+    test::Program program({"/bin/sh", "-c", "exec " + words}, {}, log.string());
+    const auto printed = [&] { return fs::exists(log) ? test::bytes_of(log) : std::string(); };
+    EXPECT_TRUE(test::wait_until([&] { return printed().find(at) != std::string::npos; })) << printed();
+    const int status = program.end(SIGINT);
+    return {status, printed()};
+  }
   const test::TempFolder folder_{test::TempFolder::On::disk};
   const fs::path out_ = folder_ / "out";
 };
@@ -80,7 +92,7 @@ TEST_F(ReconstructProgram, AMissedTargetExitsWithOneAndIsWritten) {
 }
 
 TEST_F(ReconstructProgram, CtrlCKeepsWhatIsDone) {
-  const Shell run = shell("timeout --preserve-status --signal=INT 3 " + command("--iterations 1000000"));
+  const Shell run = interrupted(command("--iterations 1000000"), "iteration");
   EXPECT_EQ(run.status, 1);
   EXPECT_THAT(run.output, HasSubstr("ended early, as asked: the volume after iteration"));
   EXPECT_TRUE(report()["stopped"]);
@@ -90,8 +102,9 @@ TEST_F(ReconstructProgram, CtrlCKeepsWhatIsDone) {
 TEST_F(ReconstructProgram, CtrlCEndsRenderingAndLeavesNothingHalfWritten) {
   ASSERT_EQ(shell(command("")).status, 0);
   const fs::path frames = folder_ / "frames";
-  const Shell run = shell("timeout --preserve-status --signal=INT 2 " + kEmberlock + " render " +
-                          out_.string() + " --device cpu --frames 100000 --out " + frames.string());
+  const Shell run = interrupted(
+      kEmberlock + " render " + out_.string() + " --device cpu --frames 100000 --out " + frames.string(),
+      "frame");
   EXPECT_EQ(run.status, 1);
   EXPECT_THAT(run.output, HasSubstr("ended early, as asked, before frame"));
   EXPECT_FALSE(fs::exists(frames));

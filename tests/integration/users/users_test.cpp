@@ -5,7 +5,6 @@
 #include <fstream>
 #include <functional>
 #include <string>
-#include <thread>
 #include <vector>
 
 #include <fmt/format.h>
@@ -265,10 +264,9 @@ TEST_F(Users, OnThisMachineATokenIsAskedForToo) {
 class Network {
  public:
   explicit Network(const std::string& more)
-      : grpc_port_(test::free_port()),
-        daemon(fmt::format("listen = \"127.0.0.1:{}\"\nhttp_listen = \"0.0.0.0:0\"\ntoken_file = \"token\"\n"
+      : daemon(fmt::format("listen = \"127.0.0.1:{}\"\nhttp_listen = \"0.0.0.0:0\"\ntoken_file = \"token\"\n"
                            "tls_certificate = \"server.crt\"\ntls_key = \"server.key\"\n{}",
-                           grpc_port_, more)) {
+                           grpc_port_.number(), more)) {
     const rig::TlsIdentity server = servers_.issue("localhost");
     daemon.secret("server.crt", server.certificate);
     daemon.secret("server.key", server.key);
@@ -288,8 +286,8 @@ class Network {
     const bool shows = certificate == Certificate::shown;
     const std::string certificates =
         fmt::format(" --tls-certificate {0}.crt --tls-key {0}.key", (mine_ / "own").string());
-    const std::string options = fmt::format(" --daemon localhost:{} --tls-ca {} --token-file {}", grpc_port_,
-                                            (mine_ / "ca.crt").string(),
+    const std::string options = fmt::format(" --daemon localhost:{} --tls-ca {} --token-file {}",
+                                            grpc_port_.number(), (mine_ / "ca.crt").string(),
                                             (mine_ / (token == Token::right ? "right" : "wrong")).string()) +
                                 (shows ? certificates : std::string());
     const std::vector<std::string> by_grpc{
@@ -300,7 +298,7 @@ class Network {
   }
 
  private:
-  int grpc_port_;
+  test::ReservedPort grpc_port_;
   test::CertificateAuthority servers_{"who signs servers"}, clients_{"who signs clients"};
   test::TempFolder mine_;
   rig::TlsIdentity own_;
@@ -356,7 +354,7 @@ export HOME={} XDG_RUNTIME_DIR={}
 cd $HOME
 {} --print-config | sed 's/^#\(http_listen = "127.0.0.1:\)7140/\10/' > rig.toml
 {} --config rig.toml 2> log & daemon=$!
-for i in $(seq 100); do {} status --json > status 2> error && grep -q phase status && break; sleep 0.1; done
+for i in $(seq 1200); do {} status --json > status 2> error && grep -q phase status && break; sleep 0.1; done
 {} console >> status 2>> error
 kill $daemon; wait $daemon; echo "ended $?" >> status
 cat status error log; find . $XDG_RUNTIME_DIR -printf '%M %p\n'

@@ -22,6 +22,7 @@ int main(int argc, char** argv) try {
   const std::filesystem::path folder = words[0];
   test::MarkerSession film;
   film.lens = {{640, 480}, 600, 600, 318.3, 243.1, {-0.2, 0.05, 0, 0.001, 0}};
+  film.rate = 15;
   film.frames = static_cast<int>(film.rate * std::atof(words[1].c_str()));
   film.drawn = 150;
   film.look.samples = 3;

@@ -4,6 +4,7 @@
 #include <atomic>
 #include <chrono>
 #include <cmath>
+#include <functional>
 #include <future>
 #include <string>
 #include <vector>
@@ -36,6 +37,15 @@ std::vector<std::string> in_short(const Jobs& jobs) {
 }
 
 JobResult done_at_once(const Observer& /*observer*/) { return v1::JobOutcome(); }
+
+/// Done at once, after it has noted this.
+template <class Note>
+std::function<JobResult(const Observer&)> after(Note note) {
+  return [note](const Observer& observer) {
+    note();
+    return done_at_once(observer);
+  };
+}
 
 /// Asks on and on, until it may end.
 class Asking {
@@ -89,7 +99,7 @@ TEST(JobsTest, PausedTheBackgroundStandsStillInTheMidstAndGoesOnAfterwards) {
   ASSERT_TRUE(wait_until([&] { return std::exchange(asked, asking.asked) == asking.asked; }));
   EXPECT_EQ(job->state().silent_s(), 0) << "it isn't to blame";
   // What somebody asked for goes on.
-  EXPECT_TRUE((*jobs.add({kVerifies, "b", done_at_once}))->wait(std::chrono::seconds(20)));
+  EXPECT_TRUE((*jobs.add({kVerifies, "b", done_at_once}))->wait(test::kHangGuard));
   asking.may_end = true;
   EXPECT_LE(asking.asked, asked + 1);
   jobs.resume();
@@ -103,12 +113,7 @@ TEST(JobsTest, TheyEndAtOnceWithTheirOwnerAndTellNothingOfWhatWasCutShort) {
   {
     Jobs jobs;
     ASSERT_TRUE(jobs.add(asking.job("a")).ok());
-    ASSERT_TRUE(jobs.add({kSalvages, "b",
-                          [&](const Observer&) -> JobResult {
-                            began = true;
-                            return v1::JobOutcome();
-                          }})
-                    .ok());
+    ASSERT_TRUE(jobs.add({kSalvages, "b", after([&] { began = true; })}).ok());
     ASSERT_TRUE(wait_until([&] { return asking.asked > 2; }));
   }
   EXPECT_EQ(asking.told, "");
@@ -128,10 +133,7 @@ TEST(JobsTest, ACancelledOneEndsAtItsNextStepAndOneThatWaitsNeverBegins) {
   Jobs jobs;
   const auto running = *jobs.add(asking.job("a"));
   std::atomic<bool> began = false;
-  const auto waiting = *jobs.add({kSalvages, "b", [&](const Observer&) -> JobResult {
-                                    began = true;
-                                    return v1::JobOutcome();
-                                  }});
+  const auto waiting = *jobs.add({kSalvages, "b", after([&] { began = true; })});
   ASSERT_TRUE(wait_until([&] { return asking.asked > 2; }));
   EXPECT_TRUE(jobs.cancel(waiting->state().id()).ok());
   EXPECT_EQ(waiting->state().state(), v1::Job::CANCELLED);
@@ -155,7 +157,7 @@ TEST(JobsTest, ARecordingsEndGoesOnWhoeverWouldCancelIt) {
   ASSERT_FALSE(refused.ok());
   EXPECT_FALSE(refused.error().remedy.empty());
   asking.may_end = true;
-  EXPECT_TRUE((*job->wait(std::chrono::seconds(20))).ok());
+  EXPECT_TRUE((*job->wait(test::kHangGuard)).ok());
 }
 
 TEST(JobsTest, TooManyThatWaitAreRefused) {
@@ -198,15 +200,12 @@ TEST(JobsTest, WhileTheyEndNothingNewIsTakenButARecordingsEnd) {
   const auto running = *jobs.add(asking.job("a", kVerifies));
   ASSERT_TRUE(wait_until([&] { return asking.asked > 0; }));
   jobs.end();
-  EXPECT_EQ(running->wait(std::chrono::seconds(20))->error().kind, ErrorKind::refused);
-  const auto late = jobs.add({kSalvages, "b", [&](const Observer&) -> JobResult {
-                                began = true;
-                                return v1::JobOutcome();
-                              }});
+  EXPECT_EQ(running->wait(test::kHangGuard)->error().kind, ErrorKind::refused);
+  const auto late = jobs.add({kSalvages, "b", after([&] { began = true; })});
   EXPECT_EQ(late.error().kind, ErrorKind::refused);
   const auto finish = jobs.add({v1::Job::FINISH, "c", done_at_once});
   ASSERT_TRUE(finish.ok());
-  EXPECT_TRUE((*finish)->wait(std::chrono::seconds(20))->ok());
+  EXPECT_TRUE((*finish)->wait(test::kHangGuard)->ok());
   jobs.drain();
   EXPECT_FALSE(began);
 }
@@ -214,10 +213,7 @@ TEST(JobsTest, WhileTheyEndNothingNewIsTakenButARecordingsEnd) {
 TEST(JobsTest, OneThatTellsNothingHangs) {
   Jobs jobs;
   std::promise<void> go_on;
-  const auto job = *jobs.add({kVerifies, "a", [&](const Observer&) -> JobResult {
-                                go_on.get_future().wait();
-                                return v1::JobOutcome();
-                              }});
+  const auto job = *jobs.add({kVerifies, "a", after([&] { go_on.get_future().wait(); })});
   EXPECT_THAT(jobs.hanging(Seconds(60)), IsEmpty());
   ASSERT_TRUE(wait_until([&] { return !jobs.hanging(Seconds(0.02)).empty(); }));
   EXPECT_EQ(jobs.hanging(Seconds(0.02)).front().session(), "a");
@@ -248,7 +244,7 @@ TEST(JobsTest, WhoWatchesHearsOfEachChangeUntilItStopsWatching) {
   ASSERT_TRUE(wait_until([&] { return asking.asked > asked + 2; }));
   EXPECT_EQ(changes, heard);
   asking.may_end = true;
-  ASSERT_TRUE(job->wait(std::chrono::seconds(20)));
+  ASSERT_TRUE(job->wait(test::kHangGuard));
   EXPECT_EQ(job->news(seen)->state(), v1::Job::DONE);
   EXPECT_TRUE(job->state().outcome().ok());
   EXPECT_FALSE(job->news(seen));
@@ -259,32 +255,14 @@ TEST(JobsTest, TheyLeaveTheProcessorToOthersAndWhoIsToldMayAddMore) {
   const auto niceness = [] { return ::getpriority(PRIO_PROCESS, static_cast<id_t>(::gettid())); };
   std::atomic<int> salvaging = 0, verifying = 0, finishing = -1;
   std::promise<bool> gone;
-  Job first{kSalvages, "a",
-            [&](const Observer&) -> JobResult {
-              salvaging = niceness();
-              return v1::JobOutcome();
-            },
-            [&](const JobResult&) {
+  Job first{kSalvages, "a", after([&] { salvaging = niceness(); }), [&](const JobResult&) {
               gone.set_value(!jobs.find(kSalvages, "a"));
-              static_cast<void>(jobs.add({kSalvages, "a", [&](const Observer&) -> JobResult {
-                                            ++salvaging;
-                                            return v1::JobOutcome();
-                                          }}));
+              static_cast<void>(jobs.add({kSalvages, "a", after([&] { ++salvaging; })}));
             }};
   ASSERT_TRUE(jobs.add(std::move(first)).ok());
   EXPECT_TRUE(gone.get_future().get());
-  ASSERT_TRUE(jobs.add({kVerifies, "b",
-                        [&](const Observer&) -> JobResult {
-                          verifying = niceness();
-                          return v1::JobOutcome();
-                        }})
-                  .ok());
-  ASSERT_TRUE(jobs.add({v1::Job::FINISH, "c",
-                        [&](const Observer&) -> JobResult {
-                          finishing = niceness();
-                          return v1::JobOutcome();
-                        }})
-                  .ok());
+  ASSERT_TRUE(jobs.add({kVerifies, "b", after([&] { verifying = niceness(); })}).ok());
+  ASSERT_TRUE(jobs.add({v1::Job::FINISH, "c", after([&] { finishing = niceness(); })}).ok());
   jobs.drain();
   EXPECT_EQ(salvaging, 20);
   EXPECT_EQ(verifying, 19);

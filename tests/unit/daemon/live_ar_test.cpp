@@ -5,11 +5,10 @@
 
 #include <fstream>
 #include <memory>
-#include <thread>
 
 #include <gmock/gmock.h>
 
-#include "session/child_messages.h"
+#include "tests/support/child_script.h"
 #include "tests/support/recording.h"
 #include "tests/support/wait.h"
 
@@ -26,7 +25,7 @@ class LiveArTest : public testing::Test {
     std::ofstream(root_ / "results/candle/frame-9/volume.vdb") << "a volume";
     options_.program = root_ / "program";
     options_.results = root_ / "results";
-    options_.patience = Seconds(20);
+    options_.patience = Seconds(test::kHangGuard.count());
     camera_.id = "left";
     camera_.layout = {{8, 6}, PixelFormat::gray8, 8};
     camera_.calibration.emplace().set_fx(10);
@@ -36,16 +35,10 @@ class LiveArTest : public testing::Test {
     request_.set_marker("aruco:4X4_50:7:80mm");
     v1::ChildMessage ready;
     ready.mutable_progress()->set_fraction(1);
-    put("ready", ready);
+    test::put_message(root_ / "ready", ready);
   }
-  void put(const std::string& name, const v1::ChildMessage& message) const {
-    std::ofstream(root_ / name, std::ios::binary) << session::framed(message);
-  }
-  /// With ROOT for the folder; what put() wrote is sent by `cat ROOT/NAME >&3`.
   LiveAr& with_script(const std::string& script) {
-    std::ofstream(root_ / "program") << "#!/bin/sh\nROOT='" << root_.path().string() << "'\n"
-                                     << script << "\n";
-    fs::permissions(root_ / "program", fs::perms::owner_all);
+    test::put_script(root_.path(), script);
     return *(ar_ = std::make_unique<LiveAr>(options_, board_));
   }
   [[nodiscard]] static Frame frame_at(std::int64_t ns) {
@@ -92,7 +85,7 @@ TEST_F(LiveArTest, WhatCannotBeShownIsRefusedAndNothingIsStarted) {
 TEST_F(LiveArTest, WhatTheChildTellsOfItsFailureIsTheAnswer) {
   v1::ChildMessage failure;
   failure.mutable_failure()->set_message("aruco:4X4: no dictionary. Give another");
-  put("failure", failure);
+  test::put_message(root_ / "failure", failure);
   const auto answer = with_script("cat $ROOT/failure >&3; exit 2").start(request_, camera_);
   ASSERT_FALSE(answer.ok());
   EXPECT_EQ(answer.error().message(), "aruco:4X4: no dictionary. Give another");
@@ -131,7 +124,7 @@ TEST_F(LiveArTest, ItTakesTheFramesOfItsCameraAloneUntilItEnds) {
   EXPECT_FALSE(ar.offer("left", frame_at(2)));
   EXPECT_TRUE(ar.start(request_, camera_).ok()) << "and again";
   ar.end();
-  test::wait_until([&] { return ar.status()->state() == v1::ArStatus::STOPPED; });
+  EXPECT_TRUE(test::wait_until([&] { return ar.status()->state() == v1::ArStatus::STOPPED; }));
   EXPECT_EQ(ar.start(request_, camera_).error().kind, ErrorKind::refused);
 }
 
@@ -140,7 +133,7 @@ TEST_F(LiveArTest, AChildThatGoesGivesThePicturesBackAndTheJournalSaysSo) {
   LiveAr& ar = with_script("cat $ROOT/ready >&3; sleep 0.3; echo gone >&2; exit 7");
   ASSERT_TRUE(ar.start(request_, camera_).ok());
   std::int64_t now = 0;
-  test::wait_until([&] { return !ar.offer("left", frame_at(++now)); });
+  EXPECT_TRUE(test::wait_until([&] { return !ar.offer("left", frame_at(++now)); }));
   EXPECT_EQ(ar.status()->state(), v1::ArStatus::FAILED);
   EXPECT_THAT(ar.status()->error(), HasSubstr("exit code 7: gone"));
   ASSERT_EQ(board_.notices(0).size(), 1U);

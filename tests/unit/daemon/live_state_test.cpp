@@ -9,6 +9,7 @@
 #include "daemon/engine/words.h"
 #include "daemon/live/live_volumes.h"
 #include "daemon/live/state.h"
+#include "tests/support/child_script.h"
 
 namespace emberlock::daemon {
 namespace {
@@ -27,15 +28,7 @@ v1::ChildMessage volume_message(std::uint64_t frame, double filmed_s, std::uint6
   live.set_seconds(0.4);
   live.set_takes_s(0.3);
   live.set_keeps_up(true);
-  v1::VolumePreview& volume = *live.mutable_volume();
-  volume.set_nx(2);
-  volume.set_ny(1);
-  volume.set_nz(1);
-  volume.set_voxels("ab");
-  for (int i = 0; i < 3; ++i) {
-    volume.mutable_box()->add_center(0);
-    volume.mutable_box()->add_size(1);
-  }
+  test::fill(*live.mutable_volume(), 2, 1, 1, "ab");
   return message;
 }
 

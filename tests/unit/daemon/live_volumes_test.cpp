@@ -2,7 +2,6 @@
 // Live volumes' child process, played by a shell script.
 #include "daemon/live/live_volumes.h"
 
-#include <filesystem>
 #include <fstream>
 #include <memory>
 #include <string>
@@ -10,38 +9,27 @@
 #include <gmock/gmock.h>
 
 #include "base/clock.h"
-#include "session/child_messages.h"
+#include "tests/support/child_script.h"
 #include "tests/support/recording.h"
 #include "tests/support/wait.h"
 
 namespace emberlock::daemon {
 namespace {
-namespace fs = std::filesystem;
 using testing::HasSubstr;
 using Live = v1::LiveStatus;
 
 class LiveVolumesTest : public testing::Test {
  protected:
-  /// With ROOT for the folder; `cat ROOT/volume >&3` sends a volume.
+  /// `cat $ROOT/volume >&3` sends a volume.
   void start(const std::string& script) {
     v1::ChildMessage message;
     v1::LiveFrame& live = *message.mutable_live_frame();
     live.set_frame(12);
     live.set_filmed_ns((SteadyClock().now() - Seconds(0.5)).ns);
     live.set_keeps_up(true);
-    v1::VolumePreview& volume = *live.mutable_volume();
-    volume.set_nx(1);
-    volume.set_ny(1);
-    volume.set_nz(1);
-    volume.set_voxels("a");
-    for (int i = 0; i < 3; ++i) {
-      volume.mutable_box()->add_center(0);
-      volume.mutable_box()->add_size(1);
-    }
-    std::ofstream(root_ / "volume", std::ios::binary) << session::framed(message);
-    std::ofstream(root_ / "program") << "#!/bin/sh\nROOT='" << root_.path().string() << "'\n"
-                                     << script << "\n";
-    fs::permissions(root_ / "program", fs::perms::owner_all);
+    test::fill(*live.mutable_volume(), 1, 1, 1, "a");
+    test::put_message(root_ / "volume", message);
+    test::put_script(root_.path(), script);
     LiveOptions options;
     options.program = root_ / "program";
     live_ = std::make_unique<LiveVolumes>(options, board_);

@@ -8,6 +8,7 @@
 #include <gmock/gmock.h>
 
 #include "daemon/reconstruction/state.h"
+#include "tests/support/child_script.h"
 
 namespace emberlock::daemon {
 namespace {
@@ -121,14 +122,7 @@ TEST(ReconstructionState, AVolumeWhoseBytesAreNotItsSizeIsNotShown) {
   ReconstructionState state = begun();
   v1::ChildMessage message = iteration(1);
   v1::VolumePreview& volume = *message.mutable_iteration()->mutable_volume();
-  volume.set_nx(2);
-  volume.set_ny(2);
-  volume.set_nz(2);
-  for (int i = 0; i < 3; ++i) {
-    volume.mutable_box()->add_center(0);
-    volume.mutable_box()->add_size(1);
-  }
-  volume.set_voxels("12345678");
+  test::fill(volume, 2, 2, 2, "12345678");
   EXPECT_TRUE(state.take(v1::ChildMessage(message))->has_volume());
   v1::VolumeLayer& layer = *volume.add_layers();
   layer.set_voxels("12345678");

@@ -11,6 +11,7 @@
 
 #include "session/reader.h"
 #include "tests/support/recording.h"
+#include "tests/support/wait.h"
 
 namespace emberlock::daemon {
 namespace {
@@ -164,13 +165,19 @@ TEST_F(Recording, OfADiskThatHangsNothingIsCalledRecorded) {
   auto recorder = Recorder::begin(temp_ / "take", test::manifest_of({large}), options, {{}}, {}).value();
   const std::string segment = temp_ / "take/cam0/000000.nut";
   ASSERT_EQ(::mkfifo(segment.c_str(), 0600), 0);
-  for (std::uint64_t i = 0; i < 100; ++i) recorder->take(0, test::noise_frame(large, i));
-  v1::RecordingStatus status = recorder->status({});
-  EXPECT_EQ(status.progress().arrived(), 100);
+  std::uint64_t taken = 0;
+  v1::RecordingStatus status;
+  // What the writer takes from the queue before it hangs makes room for more.
+  ASSERT_TRUE(test::wait_until([&] {
+    do recorder->take(0, test::noise_frame(large, taken++));
+    while (taken < 100);
+    status = recorder->status({});
+    return status.queue_fill() == 1;
+  }));
+  EXPECT_EQ(status.progress().arrived(), taken);
   EXPECT_EQ(status.frames(), 0);
-  EXPECT_EQ(status.queue_fill(), 1);
   EXPECT_GE(status.lost().queue(), 80);
-  EXPECT_EQ(status.progress().queued() + status.progress().written() + status.lost().queue(), 100);
+  EXPECT_EQ(status.progress().queued() + status.progress().written() + status.lost().queue(), taken);
   EXPECT_GT(status.progress().at_risk_s(), 0);
   std::thread disk([&] {
     std::ifstream in(segment, std::ios::binary);
@@ -179,12 +186,12 @@ TEST_F(Recording, OfADiskThatHangsNothingIsCalledRecorded) {
     }
   });
   std::vector<drivers::FrameCounts> after(1);
-  after[0].delivered = 100;
+  after[0].delivered = taken;
   status = recorder->finish(after, {});
   disk.join();
   EXPECT_EQ(status.state(), v1::RecordingStatus::COMPLETE) << status.verdict();
   EXPECT_EQ(status.frames(), 0) << "a pipe keeps nothing";
-  EXPECT_EQ(status.lost().queue() + status.lost().disk(), 100);
+  EXPECT_EQ(status.lost().queue() + status.lost().disk(), taken);
 }
 
 TEST_F(Recording, BelowTheFloorOfFreeSpaceNoneIsBegunAndNoFolderIsLeft) {

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 // A leading host and one that lends, over TLS on this machine: cameras, parts of recordings.
-#include <chrono>
+#include <algorithm>
+#include <atomic>
 #include <filesystem>
 #include <fstream>
 #include <mutex>
-#include <thread>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -15,6 +15,7 @@
 #include "drivers/replay/record.h"
 #include "session/files.h"
 #include "tests/support/certificate.h"
+#include "tests/support/http_client.h"
 #include "tests/support/recording.h"
 #include "tests/support/wait.h"
 
@@ -27,8 +28,10 @@ using ::testing::HasSubstr;
 
 constexpr ImageLayout kLentLayout{{16, 8}, PixelFormat::gray8, 8};
 
-Frame lent_frame(std::uint64_t id) {
-  return {{.frame_id = id, .device_time = {}, .system_time = {}, .monotonic_time = SteadyClock().now()},
+constexpr Seconds kPatience{static_cast<double>(test::kHangGuard.count())};
+
+Frame lent_frame(std::uint64_t id, TimePoint at = SteadyClock().now()) {
+  return {{.frame_id = id, .device_time = {}, .system_time = {}, .monotonic_time = at},
           std::make_shared<Image>(kLentLayout)};
 }
 
@@ -50,7 +53,9 @@ class FakeLender final : public Lender {
   }
   void hear(const std::string& /*leader*/) override {}
   Result<std::shared_ptr<LentFrames>> watch(const v1::FramesRequest& /*request*/) override {
-    return loan.watch(0);
+    auto frames = loan.watch(0);
+    ++watches;
+    return frames;
   }
   Status reset(const v1::ResetRequest& request) override {
     const std::lock_guard lock(mutex);
@@ -90,7 +95,8 @@ class FakeLender final : public Lender {
 
   std::mutex mutex;
   std::string asked_by;
-  bool films = true;
+  std::atomic<int> watches = 0;  ///< that have begun
+  std::atomic<bool> films = true;
   bool refuses = false;
   bool loses_answers = false;  ///< to Record and to Part
   Loan loan{1};
@@ -112,7 +118,7 @@ class RemoteHostTest : public ::testing::Test {
     config.certificate = temp / "host.crt";
     config.key = temp / "host.key";
     config.authority = temp / "authority.crt";
-    config.listen = "127.0.0.1:0";
+    config.listen = "127.0.0.1:" + std::to_string(port.number());
     serve();
   }
   void write(const std::string& name, const std::string& text) {
@@ -123,7 +129,6 @@ class RemoteHostTest : public ::testing::Test {
     auto started = LendingServer::start(lender, config);
     ASSERT_TRUE(started.ok()) << started.error().message();
     server = std::move(*started);
-    config.listen = "127.0.0.1:" + std::to_string(server->port());
   }
   std::shared_ptr<RemoteHost> reach(const rig::HostsConfig& as) {
     auto channel = channel_to(config.listen, as);
@@ -139,17 +144,28 @@ class RemoteHostTest : public ::testing::Test {
     return std::make_unique<RemoteCamera>(
         host, drivers::CameraInfo{.id = "cam", .model = "", .layout = {}, .frame_rate = Hertz(24)});
   }
-  /// Until the camera has it: a watch begins when its call has arrived.
+  /// A camera that films: the call that watches it has arrived at its host.
+  std::unique_ptr<RemoteCamera> filming(const std::shared_ptr<RemoteHost>& host) {
+    auto cam = camera(host);
+    start(*cam);
+    return cam;
+  }
+  void start(drivers::Camera& cam) {
+    const int before = lender.watches;
+    const Status started = cam.start();
+    ASSERT_TRUE(started.ok()) << started.error().message();
+    ASSERT_TRUE(wait_until([&] { return lender.watches > before; }));
+  }
+  void offer(const Frame& frame, const drivers::FrameCounts& counts = {}) {
+    lender.loan.offer(0, frame, counts, Seconds(0));
+  }
   Result<Frame> send(drivers::Camera& to, std::uint64_t id, const drivers::FrameCounts& counts = {}) {
-    Result<Frame> frame = Error{ErrorKind::timed_out, "none yet"};
-    for (int i = 0; i < 500 && !frame.ok(); ++i) {
-      lender.loan.offer(0, lent_frame(id), counts, Seconds(0));
-      frame = to.next_frame(milliseconds(20));
-    }
-    return frame;
+    offer(lent_frame(id), counts);
+    return to.next_frame(kPatience);
   }
 
   test::TempFolder temp;
+  test::ReservedPort port;  ///< the host's, also while it is away
   test::CertificateAuthority authority{"who signs hosts"};
   rig::HostsConfig config;
   FakeLender lender;
@@ -181,9 +197,7 @@ TEST_F(RemoteHostTest, WithoutACertificateOfTheHostsNobodyIsLetIn) {
 }
 
 TEST_F(RemoteHostTest, ACameraFilmsFromAfar) {
-  const auto host = reach();
-  const auto cam = camera(host);
-  ASSERT_TRUE(cam->start().ok());
+  const auto cam = filming(reach());
   EXPECT_EQ(lender.asked_by, "dome at here");
   EXPECT_EQ(cam->info().model, "a model");
   EXPECT_EQ(cam->info().layout, kLentLayout);
@@ -195,15 +209,10 @@ TEST_F(RemoteHostTest, ACameraFilmsFromAfar) {
 }
 
 TEST_F(RemoteHostTest, OfFramesThatWerentSentTheCountsAreRight) {
-  const auto host = reach();
-  const auto cam = camera(host);
-  ASSERT_TRUE(cam->start().ok());
+  const auto cam = filming(reach());
   ASSERT_TRUE(send(*cam, 1, {.delivered = 100}).ok());
-  while (cam->next_frame(milliseconds(20)).ok()) {
-  }
   const drivers::FrameCounts before = cam->counts();
-  lender.loan.offer(0, lent_frame(2), {.delivered = 110, .transport = 3}, Seconds(0));
-  ASSERT_TRUE(cam->next_frame(Seconds(5)).ok());
+  ASSERT_TRUE(send(*cam, 2, {.delivered = 110, .transport = 3}).ok());
   const drivers::FrameCounts since = cam->counts() - before;
   EXPECT_EQ(since.delivered, 1U);
   EXPECT_EQ(since.passed_over, 9U);
@@ -212,31 +221,29 @@ TEST_F(RemoteHostTest, OfFramesThatWerentSentTheCountsAreRight) {
 
 TEST_F(RemoteHostTest, AResetGoesThereAndEarlierFramesAreDropped) {
   const auto host = reach();
-  const auto cam = camera(host);
-  ASSERT_TRUE(cam->start().ok());
+  const auto cam = filming(host);
   ASSERT_TRUE(send(*cam, 1).ok());
-  const TimePoint at = SteadyClock().now() + milliseconds(150);
+  const TimePoint at = SteadyClock().now() + kPatience;
+  const double before_s = host->status().clock_sigma_s();
   ASSERT_TRUE(cam->reset_shutter(at).ok());
+  const double known_s = std::max(before_s, host->status().clock_sigma_s());
   ASSERT_EQ(lender.resets.size(), 1U);
-  EXPECT_NEAR(1e-9 * static_cast<double>(lender.resets[0].at_ns() - at.ns), 0, 0.05);
-  lender.loan.offer(0, lent_frame(2), {}, Seconds(0));
-  EXPECT_EQ(cam->next_frame(milliseconds(50)).error().kind, ErrorKind::timed_out);
-  SteadyClock().sleep_until(at + milliseconds(100));
-  EXPECT_EQ(send(*cam, 3)->stamp.frame_id, 3U);
+  EXPECT_NEAR(1e-9 * static_cast<double>(lender.resets[0].at_ns() - at.ns), 0, known_s + 1e-6);
+  offer(lent_frame(2, at - Seconds(10)));
+  offer(lent_frame(3, at + Seconds(10)));
+  EXPECT_EQ(cam->next_frame(kPatience)->stamp.frame_id, 3U);
   ASSERT_TRUE(cam->trim_rate(PartsPerMillion(12)).ok());
   EXPECT_EQ(lender.trim_ppm, 12);
 }
 
 TEST_F(RemoteHostTest, ACamerasErrorThereIsOneHere) {
-  const auto host = reach();
-  const auto cam = camera(host);
-  ASSERT_TRUE(cam->start().ok());
+  const auto cam = filming(reach());
   ASSERT_TRUE(send(*cam, 1).ok());
   lender.loan.fail(0, {ErrorKind::device, "it was unplugged", "camera cam", "Plug it in"});
-  Result<Frame> next = cam->next_frame(Seconds(5));
-  while (next.ok()) next = cam->next_frame(Seconds(5));
-  EXPECT_EQ(next.error().kind, ErrorKind::device);
-  EXPECT_THAT(next.error().message(), HasSubstr("unplugged"));
+  const Result<Frame> failed = cam->next_frame(kPatience);
+  ASSERT_FALSE(failed.ok());
+  EXPECT_EQ(failed.error().kind, ErrorKind::device);
+  EXPECT_THAT(failed.error().message(), HasSubstr("unplugged"));
   lender.films = false;
   EXPECT_THAT(cam->start().error().message(), HasSubstr("doesn't film"));
   lender.films = true;
@@ -245,18 +252,15 @@ TEST_F(RemoteHostTest, ACamerasErrorThereIsOneHere) {
 
 TEST_F(RemoteHostTest, AHostThatIsGoneIsAnErrorWithinSecondsAndTakenUpAgain) {
   const auto host = reach();
-  const auto cam = camera(host);
-  ASSERT_TRUE(cam->start().ok());
+  const auto cam = filming(host);
   ASSERT_TRUE(send(*cam, 1).ok());
   server.reset();
-  Result<Frame> next = cam->next_frame(Seconds(5));
-  while (next.ok() || next.error().kind == ErrorKind::timed_out) next = cam->next_frame(milliseconds(100));
-  EXPECT_EQ(next.error().kind, ErrorKind::device);
+  EXPECT_EQ(cam->next_frame(kPatience).error().kind, ErrorKind::device);
   ASSERT_TRUE(wait_until([&] { return !host->connected(); }));
   EXPECT_EQ(cam->start().error().kind, ErrorKind::device);
   serve();
   ASSERT_TRUE(wait_until([&] { return host->connected(); }));
-  EXPECT_TRUE(cam->start().ok());
+  start(*cam);
   EXPECT_TRUE(send(*cam, 2).ok());
 }
 
@@ -267,7 +271,7 @@ class HostPartsTest : public RemoteHostTest {
     const auto manifest = session::read_manifest(folder);
     request.mutable_manifest()->set_session_id(manifest->session_id());
     request.mutable_manifest()->add_cameras()->set_camera_id("cam");
-    request.set_from_ns(SteadyClock().now().ns + 150'000'000);
+    begins_in(kPatience);
     known.set_session("take");
     known.set_state(v1::HostPart::RECORDING);
     known.add_camera_ids("cam");
@@ -280,6 +284,12 @@ class HostPartsTest : public RemoteHostTest {
   }
   [[nodiscard]] v1::HostPart kept() const { return session::read_manifest(folder)->hosts(0); }
   void begin(HostParts& parts) const { parts.begin(folder, {request}, {known}); }
+  /// When the recording of which these are parts does.
+  void begins_in(Seconds time) { request.set_from_ns((SteadyClock().now() + time).ns); }
+  void end(HostParts& parts) const {
+    parts.end(folder, SteadyClock().now());
+    ASSERT_TRUE(parts.close(folder, kPatience).ok());
+  }
   static bool any_news(HostParts& parts, v1::HostPart::State state) {
     return wait_until([&] {
       for (const PartNews& news : parts.news())
@@ -304,8 +314,7 @@ TEST_F(HostPartsTest, APartIsBegunEndedAndKnownToBeWhole) {
   EXPECT_EQ(parts.of(folder)[0].state(), v1::HostPart::RECORDING);
   EXPECT_EQ(lender.recorded->name(), "take");
   EXPECT_EQ(lender.recorded->leader(), "dome at here");
-  parts.end(folder, SteadyClock().now());
-  ASSERT_TRUE(parts.close(folder, Seconds(10)).ok());
+  end(parts);
   EXPECT_EQ(kept().state(), v1::HostPart::WHOLE) << kept().why();
   EXPECT_EQ(kept().frames(), 240U);
   EXPECT_EQ(kept().clock_size(), 2);
@@ -317,46 +326,42 @@ TEST_F(HostPartsTest, OneThatEndsEarlyIsShort) {
   lender.early_ns = 3'000'000'000;
   HostParts parts({known_host()});
   begin(parts);
-  parts.end(folder, SteadyClock().now());
-  ASSERT_TRUE(parts.close(folder, Seconds(10)).ok());
+  end(parts);
   EXPECT_EQ(kept().state(), v1::HostPart::SHORT);
   EXPECT_THAT(kept().why(), HasSubstr("3.0 s before"));
 }
 
 TEST_F(HostPartsTest, OneThatCantBeginIsMissingAndBeginsWhenItCan) {
   lender.refuses = true;
+  begins_in(Seconds(-10));
   HostParts parts({known_host()});
   begin(parts);
   EXPECT_TRUE(any_news(parts, v1::HostPart::MISSING));
   EXPECT_THAT(parts.of(folder)[0].why(), HasSubstr("its disk is full"));
   EXPECT_EQ(parts.hosts()[0].parts_wanting(), 1U);
   {
-    SteadyClock().sleep_until(SteadyClock().now() + milliseconds(600));
     const std::lock_guard lock(lender.mutex);
     lender.refuses = false;
   }
   EXPECT_TRUE(any_news(parts, v1::HostPart::RECORDING));
-  SteadyClock().sleep_until(SteadyClock().now() + milliseconds(600));
-  parts.end(folder, SteadyClock().now());
-  ASSERT_TRUE(parts.close(folder, Seconds(10)).ok());
+  end(parts);
   EXPECT_EQ(kept().state(), v1::HostPart::SHORT);
   EXPECT_THAT(kept().why(), HasSubstr("after the recording does"));
 }
 
 TEST_F(HostPartsTest, OneOfWhichItIsNotKnownWhenItBeganIsntCalledWhole) {
   lender.loses_answers = true;
+  begins_in(Seconds(-10));
   HostParts parts({known_host()});
   begin(parts);
   EXPECT_TRUE(any_news(parts, v1::HostPart::MISSING));
-  SteadyClock().sleep_until(SteadyClock().now() + milliseconds(800));
   {
     const std::lock_guard lock(lender.mutex);
     ASSERT_TRUE(lender.recorded.has_value());
     lender.loses_answers = false;
   }
   EXPECT_TRUE(any_news(parts, v1::HostPart::RECORDING));
-  parts.end(folder, SteadyClock().now());
-  ASSERT_TRUE(parts.close(folder, Seconds(10)).ok());
+  end(parts);
   EXPECT_EQ(kept().state(), v1::HostPart::SHORT);
   EXPECT_THAT(kept().why(), HasSubstr("its frames begin up to"));
 }
@@ -368,7 +373,7 @@ TEST_F(HostPartsTest, OneWhoseHostIsAwayIsMissingAndKnownWhenItIsBack) {
   server.reset();
   parts->end(folder, SteadyClock().now());
   ASSERT_TRUE(any_news(*parts, v1::HostPart::MISSING));
-  ASSERT_TRUE(parts->close(folder, Seconds(10)).ok());
+  ASSERT_TRUE(parts->close(folder, kPatience).ok());
   EXPECT_EQ(kept().state(), v1::HostPart::MISSING);
   EXPECT_THAT(kept().why(), HasSubstr("doesn't answer"));
   // emberlockd is restarted meanwhile.
@@ -397,16 +402,14 @@ TEST_F(HostPartsTest, AClockThatWasSetAnewMeanwhileIsntJoinedWithTheOldOne) {
   before.set_at_ns(SteadyClock().now().ns - 1'000'000'000);
   before.set_ahead_ns(5'000'000'000'000);  // before the machine was started anew
   begin(parts);
-  parts.end(folder, SteadyClock().now());
-  ASSERT_TRUE(parts.close(folder, Seconds(10)).ok());
+  end(parts);
   EXPECT_EQ(kept().clock_size(), 1);
 }
 
 TEST_F(HostPartsTest, WhatIsWholeIsntAskedForAgain) {
   HostParts parts({known_host()});
   begin(parts);
-  parts.end(folder, SteadyClock().now());
-  ASSERT_TRUE(parts.close(folder, Seconds(10)).ok());
+  end(parts);
   HostParts again({reach()});
   again.take_up({folder, temp / "no session"});
   EXPECT_TRUE(again.of(folder).empty());

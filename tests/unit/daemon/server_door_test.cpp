@@ -2,16 +2,13 @@
 // Who gets in over HTTP on this machine: browsers by a link, programs by the token, nobody else; and nobody
 // shuts the operator out.
 #include <chrono>
-#include <fstream>
 #include <memory>
 #include <vector>
 
 #include <gmock/gmock.h>
 
 #include "base/clock.h"
-#include "daemon/server/http_server.h"
-#include "tests/support/fake_api.h"
-#include "tests/support/recording.h"
+#include "tests/support/http_server.h"
 #include "tests/support/wait.h"
 #include "tests/support/watch_client.h"
 
@@ -29,26 +26,12 @@ using testing::Not;
 
 const std::string kBare = "Host: 127.0.0.1:7140\r\n";
 
-class ServerDoor : public testing::Test {
+class ServerDoor : public test::HttpServerTest {
  protected:
-  ServerDoor() {
-    std::filesystem::create_directories(folder / "console/assets");
-    std::ofstream(folder / "console/index.html") << "<!doctype html>console";
-    std::ofstream(folder / "console/assets/main.js") << "start()";
-  }
+  ServerDoor() { test::put_bytes(folder / "console/assets/main.js", "start()"); }
   void serve(HttpServerOptions options = {}) {
-    options.listen = "127.0.0.1:0";
-    options.console = folder / "console";
     options.sessions = sessions;
-    auto started = HttpServer::start(api, std::move(options));
-    ASSERT_TRUE(started.ok()) << started.error().message();
-    server = std::move(started).value();
-    port = server->port();
-  }
-  static HttpServerOptions with_token() {
-    HttpServerOptions options;
-    options.token = *rig::Token::parse(test::kHttpToken);
-    return options;
+    HttpServerTest::serve(std::move(options));
   }
   /// "/open?link=..."
   std::string link() {
@@ -72,11 +55,7 @@ class ServerDoor : public testing::Test {
     return at == std::string::npos ? -1 : std::stod(metrics.substr(at + sample.size()));
   }
 
-  test::TempFolder folder;
-  test::FakeApi api;
   std::shared_ptr<ConsoleSessions> sessions = std::make_shared<ConsoleSessions>();
-  std::unique_ptr<HttpServer> server;
-  int port = 0;
 };
 
 TEST_F(ServerDoor, WhoShowsNothingIsToldWhatToDoAndGetsNothingElse) {
@@ -247,8 +226,7 @@ TEST_F(ServerDoor, ACallThatRunsIsNotCutOffByTheNext) {
   const std::string known = browser();
   test::EndlessJob job;
   api.on_job = std::ref(job);
-  const UniqueFd client = test::connect_to(port);
-  test::send_all(client, "POST /api/v1/Sessions/Export HTTP/1.1\r\n" + known + "Content-Length: 0\r\n\r\n");
+  const UniqueFd client = call("Sessions/Export", known);
   ASSERT_TRUE(wait_until([&] { return job.begun(); }));
   EXPECT_EQ(ask(port, "GET", "/healthz", "", kBare).status, 0) << "there is no place";
   EXPECT_FALSE(job.ended());
@@ -269,10 +247,7 @@ TEST_F(ServerDoor, IdleWebSocketsOfOneSessionMakeRoomForAnothers) {
     EXPECT_TRUE(crowd.back()->open());
   }
   EXPECT_EQ(server->viewers(), 64U);
-  console.say("", 9);
-  auto answer = console.hear();
-  while (answer && answer->opcode != 10) answer = console.hear();
-  EXPECT_TRUE(answer) << "it still answers";
+  EXPECT_TRUE(console.wish("{\"watch\": null}")) << "it still answers";
 }
 
 }  // namespace

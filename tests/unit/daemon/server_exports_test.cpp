@@ -1,17 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 // Exported videos, fetched from the console's server.
 #include <filesystem>
-#include <fstream>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "daemon/server/exported_file.h"
-#include "daemon/server/http_server.h"
 #include "session/store.h"
-#include "tests/support/fake_api.h"
-#include "tests/support/http_client.h"
-#include "tests/support/recording.h"
+#include "tests/support/http_server.h"
 
 namespace emberlock::daemon {
 namespace {
@@ -24,37 +20,29 @@ using testing::HasSubstr;
 using testing::IsEmpty;
 using testing::Not;
 
-class ServerExportsTest : public testing::Test {
+class ServerExportsTest : public test::HttpServerTest {
  protected:
   ServerExportsTest() {
     fs::create_directories(videos / "folder.mp4");
-    write(videos / "cam 1.mp4", "film");
-    write(folder / "secret", "secret");
-    write(videos / ".hidden", "secret");
-    write(folder / "exports/take 1/above.mp4", "secret");
+    test::put_bytes(videos / "cam 1.mp4", "film");
+    test::put_bytes(folder / "secret", "secret");
+    test::put_bytes(videos / ".hidden", "secret");
+    test::put_bytes(folder / "exports/take 1/above.mp4", "secret");
     fs::create_symlink(folder / "secret", videos / "link.mp4");
     fs::create_directories(folder / "elsewhere");
-    write(folder / "elsewhere/cam.mp4", "secret");
+    test::put_bytes(folder / "elsewhere/cam.mp4", "secret");
     fs::create_directories(folder / "exports/linked");
     fs::create_directory_symlink(folder / "elsewhere", folder / "exports/linked/video");
-    HttpServerOptions options{.listen = "127.0.0.1:0"};
-    options.token = *rig::Token::parse(test::kHttpToken);
+    HttpServerOptions options = with_token();
     options.export_folder = [this](std::string_view session) {
       return store.path_for_export(session, "video");
     };
-    server = HttpServer::start(api, std::move(options)).value();
-    port = server->port();
+    serve(std::move(options));
   }
-  static void write(const fs::path& path, const std::string& content) {
-    std::ofstream(path, std::ios::binary) << content;
-  }
+  ~ServerExportsTest() override { server.reset(); }
 
-  test::TempFolder folder;
   fs::path videos = folder / "exports/take 1/video";
   session::SessionStore store = session::SessionStore::open(folder / "sessions").value();
-  test::FakeApi api;
-  std::unique_ptr<HttpServer> server;
-  int port = 0;
 };
 
 TEST_F(ServerExportsTest, AVideoIsSentToBeSaved) {
@@ -89,7 +77,7 @@ TEST_F(ServerExportsTest, AConnectionGoesOnAfterAVideo) {
 TEST_F(ServerExportsTest, NamesAreInAnyScript) {
   const fs::path there = folder / "exports/пламя/video";
   fs::create_directories(there);
-  write(there / "камера.mp4", "film");
+  test::put_bytes(there / "камера.mp4", "film");
   const HttpAnswer answer = ask(port, "GET",
                                 "/exports/%D0%BF%D0%BB%D0%B0%D0%BC%D1%8F/video/"
                                 "%D0%BA%D0%B0%D0%BC%D0%B5%D1%80%D0%B0.mp4");
@@ -140,19 +128,17 @@ TEST_F(ServerExportsTest, WithoutTheTokenNothingIsSent) {
 
 /// The client reads the first bytes of a file that the disk doesn't even hold, then leaves.
 TEST_F(ServerExportsTest, ALargeFileIsSentPieceByPiece) {
-  write(videos / "large.mp4", "begin");
+  test::put_bytes(videos / "large.mp4", "begin");
   fs::resize_file(videos / "large.mp4", std::uintmax_t{1} << 40);
   {
     const UniqueFd client = test::connect_to(port);
     test::send_all(client, "GET /exports/take%201/video/large.mp4 HTTP/1.1\r\n" + test::kLetIn + "\r\n");
-    std::string answer;
-    for (char c = 0; !answer.ends_with("\r\n\r\nbegin") && ::read(client.get(), &c, 1) == 1;) answer += c;
-    EXPECT_THAT(answer, HasSubstr("Content-Length: 1099511627776"));
+    EXPECT_THAT(read_until(client, "\r\n\r\nbegin"), HasSubstr("Content-Length: 1099511627776"));
     EXPECT_EQ(ask(port, "GET", "/exports/take%201/video/cam%201.mp4").body, "film") << "others are served";
   }
   std::string bytes(std::size_t{8} << 20, '\0');
   for (std::size_t i = 0; i < bytes.size(); ++i) bytes[i] = static_cast<char>(i * 2654435761U >> 13);
-  write(videos / "whole.mp4", bytes);
+  test::put_bytes(videos / "whole.mp4", bytes);
   EXPECT_TRUE(ask(port, "GET", "/exports/take%201/video/whole.mp4").body == bytes);
 }
 

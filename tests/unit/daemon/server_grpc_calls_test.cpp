@@ -4,7 +4,6 @@
 #include <atomic>
 #include <chrono>
 #include <future>
-#include <thread>
 
 #include <gmock/gmock.h>
 #include <grpcpp/generic/generic_stub.h>
@@ -22,11 +21,7 @@ using testing::IsEmpty;
 using ServerGrpcCalls = test::GrpcServerTest;
 
 TEST_F(ServerGrpcCalls, CallsAreAskedOfTheApiAndAnsweredByIt) {
-  api.on_record = [](const v1::RecordRequest& request) {
-    v1::RecordingStatus status;
-    status.set_session(request.name());
-    return status;
-  };
+  api.on_record = test::recording_of_that_name;
   serve();
   const auto capture = v1::Capture::NewStub(channel());
   v1::RecordRequest request;
@@ -62,12 +57,7 @@ TEST_F(ServerGrpcCalls, EachKindOfErrorHasItsCodeAndTheWholeMessage) {
 }
 
 TEST_F(ServerGrpcCalls, AStepReachesTheStylizationAndItsRefusalTheCaller) {
-  api.on_edit_reconstruction = [](const v1::EditRequest& request) -> Result<v1::StylizationStatus> {
-    if (request.picture() != "picture") return Error{ErrorKind::bad_input, "is missing", "step: picture"};
-    v1::StylizationStatus status;
-    status.set_steps(3);
-    return status;
-  };
+  api.on_edit_reconstruction = test::step_with_picture;
   serve();
   const auto reconstruct = v1::Reconstruct::NewStub(channel());
   v1::EditRequest request;
@@ -77,7 +67,7 @@ TEST_F(ServerGrpcCalls, AStepReachesTheStylizationAndItsRefusalTheCaller) {
   const grpc::Status refused = reconstruct->Edit(&first, request, &answer);
   EXPECT_EQ(refused.error_code(), grpc::INVALID_ARGUMENT);
   EXPECT_EQ(refused.error_message(), "step: picture: is missing");
-  request.set_picture("picture");
+  request.set_picture("voxels");
   grpc::ClientContext second;
   EXPECT_TRUE(reconstruct->Edit(&second, request, &answer).ok());
   EXPECT_EQ(answer.steps(), 3U);
@@ -88,12 +78,7 @@ TEST_F(ServerGrpcCalls, AStepReachesTheStylizationAndItsRefusalTheCaller) {
 }
 
 TEST_F(ServerGrpcCalls, AFrameThatIsNotHeldIsNotFound) {
-  api.on_reconstructed_frame = [](const v1::FrameRequest& request) {
-    if (request.frame() != 12) return std::shared_ptr<const v1::IterationPreview>();
-    auto kept = std::make_shared<v1::IterationPreview>();
-    kept->mutable_volume()->set_voxels("voxels");
-    return std::shared_ptr<const v1::IterationPreview>(kept);
-  };
+  api.on_reconstructed_frame = test::twelfth_frame;
   serve();
   const auto reconstruct = v1::Reconstruct::NewStub(channel());
   const auto ask = [&](std::uint64_t frame, v1::IterationPreview& answer) {

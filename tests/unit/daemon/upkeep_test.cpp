@@ -39,8 +39,20 @@ UpkeepTold compressed_into(std::map<std::string, std::string>& outcomes) {
   }};
 }
 
-TEST(Upkeep, CompressesWhatIsAddedAndTellsOfEachThatNeededIt) {
+/// The good frames of a session's camera; 0 where it isn't whole.
+std::uint64_t whole_frames(const std::filesystem::path& folder) {
+  const auto check = session::verify_session(folder);
+  EXPECT_TRUE(check) << check.error().message();
+  return check && check->whole() ? check->cameras.at(0).good : 0;
+}
+
+class Upkeep : public testing::Test {
+ protected:
   const TempFolder temp;
+  const session::SessionStore store = session::SessionStore::open(temp / "store").value();
+};
+
+TEST_F(Upkeep, CompressesWhatIsAddedAndTellsOfEachThatNeededIt) {
   record_raw(temp / "a");
   record_raw(temp / "b");
   record(temp / "compressed already", kUpkeptLayout, 3, small_disk_options());
@@ -52,36 +64,27 @@ TEST(Upkeep, CompressesWhatIsAddedAndTellsOfEachThatNeededIt) {
   EXPECT_EQ(outcomes, (std::map<std::string, std::string>{{"a", ""}, {"b", ""}}));
   for (const char* name : {"a", "b"}) {
     EXPECT_FALSE(is_uncompressed(temp / name));
-    const auto check = session::verify_session(temp / name);
-    ASSERT_TRUE(check) << check.error().message();
-    EXPECT_TRUE(check->whole());
-    EXPECT_EQ(check->cameras.at(0).good, kUpkeptFrames);
+    EXPECT_EQ(whole_frames(temp / name), kUpkeptFrames);
   }
   EXPECT_TRUE(jobs.list().empty());
 }
 
-TEST(Upkeep, CompressionEndedInTheMidstIsTakenUpByTheNext) {
-  const TempFolder temp;
+TEST_F(Upkeep, CompressionEndedInTheMidstIsTakenUpByTheNext) {
   record_raw(temp / "a");
   {
     Jobs jobs;
     compress_later(temp / "a", jobs, {});
     while (is_uncompressed(temp / "a") && !in_work(jobs)) std::this_thread::yield();
   }
-  auto check = session::verify_session(temp / "a");
-  ASSERT_TRUE(check) << check.error().message();
-  EXPECT_TRUE(check->whole());
+  EXPECT_EQ(whole_frames(temp / "a"), kUpkeptFrames);
   Jobs jobs;
   compress_later(temp / "a", jobs, {});
   jobs.drain();
   EXPECT_FALSE(is_uncompressed(temp / "a"));
-  check = session::verify_session(temp / "a");
-  ASSERT_TRUE(check) << check.error().message();
-  EXPECT_TRUE(check->whole());
+  EXPECT_EQ(whole_frames(temp / "a"), kUpkeptFrames);
 }
 
-TEST(Upkeep, AFailureIsToldAndKeepsWhatCanBeRead) {
-  const TempFolder temp;
+TEST_F(Upkeep, AFailureIsToldAndKeepsWhatCanBeRead) {
   record_raw(temp / "damaged");
   record_raw(temp / "next");
   const auto segment = session::find_segment(temp / "damaged", "cam0", 0);
@@ -122,9 +125,7 @@ struct Told {
   std::vector<std::string> lines;
 };
 
-TEST(Upkeep, WhatAnEarlierDaemonLeftIsSalvagedFirstAndThenCompressed) {
-  const TempFolder temp;
-  const session::SessionStore store = session::SessionStore::open(temp / "store").value();
+TEST_F(Upkeep, WhatAnEarlierDaemonLeftIsSalvagedFirstAndThenCompressed) {
   record_raw(store.folder() / "a raw");
   record(store.folder() / "b finished", kUpkeptLayout, 5, small_disk_options());
   leave_killed_session(store.folder() / "c killed");
@@ -146,9 +147,7 @@ TEST(Upkeep, WhatAnEarlierDaemonLeftIsSalvagedFirstAndThenCompressed) {
   }
 }
 
-TEST(Upkeep, ASessionThatWaitsForSalvageIsRefusedForAllElseAndSaysSo) {
-  const TempFolder temp;
-  const session::SessionStore store = session::SessionStore::open(temp / "store").value();
+TEST_F(Upkeep, ASessionThatWaitsForSalvageIsRefusedForAllElseAndSaysSo) {
   leave_killed_session(store.folder() / "killed");
   Jobs jobs;
   jobs.pause();
@@ -165,9 +164,7 @@ TEST(Upkeep, ASessionThatWaitsForSalvageIsRefusedForAllElseAndSaysSo) {
   EXPECT_TRUE(session::SessionReader::open(store.folder() / "killed").ok());
 }
 
-TEST(Upkeep, ASessionThatSomebodyStillRecordsStaysAsItIs) {
-  const TempFolder temp;
-  const session::SessionStore store = session::SessionStore::open(temp / "store").value();
+TEST_F(Upkeep, ASessionThatSomebodyStillRecordsStaysAsItIs) {
   auto alive = session::SessionWriter::create(store.folder() / "recorded now",
                                               test::manifest_of({kUpkeptLayout}), small_disk_options());
   ASSERT_TRUE(alive);
@@ -179,9 +176,7 @@ TEST(Upkeep, ASessionThatSomebodyStillRecordsStaysAsItIs) {
   EXPECT_EQ(session::read_manifest(store.folder() / "recorded now")->state(), v1::Manifest::RECORDING);
 }
 
-TEST(Upkeep, EndedInMidSalvageTheNextStartGoesOnAndLosesNothing) {
-  const TempFolder temp;
-  const session::SessionStore store = session::SessionStore::open(temp / "store").value();
+TEST_F(Upkeep, EndedInMidSalvageTheNextStartGoesOnAndLosesNothing) {
   leave_killed_session(store.folder() / "killed");
   {
     Jobs jobs;
@@ -195,10 +190,7 @@ TEST(Upkeep, EndedInMidSalvageTheNextStartGoesOnAndLosesNothing) {
   take_up(store, jobs, rig::RecordingConfig::Transcode::never, told.told());
   jobs.drain();
   EXPECT_LE(told.lines.size(), 1U);
-  const auto check = session::verify_session(store.folder() / "killed");
-  ASSERT_TRUE(check) << check.error().message();
-  EXPECT_TRUE(check->whole());
-  EXPECT_GT(check->cameras.at(0).good, 10U);
+  EXPECT_GT(whole_frames(store.folder() / "killed"), 10U);
 }
 
 }  // namespace

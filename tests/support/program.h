@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cstdio>
 #include <cstdlib>
 #include <fstream>
+#include <optional>
 #include <sstream>
 #include <string>
 #include <utility>
@@ -14,16 +16,23 @@
 
 namespace emberlock::test {
 
-/// emberlockd, on a configuration of its own, killed with this object.
+using Environment = std::vector<std::pair<std::string, std::string>>;
+
+/// A program that runs in the background, and is killed with this object.
 class Program {
  public:
-  /// `environment` is added to this one's.
-  explicit Program(const char* program, const std::string& config,
-                   const std::vector<std::pair<std::string, std::string>>& environment = {}) {
+  /// `command`: the program's path and its arguments. `environment` is added to this process's. stdout and
+  /// stderr go to the file `log`, if one is named.
+  explicit Program(const std::vector<std::string>& command, const Environment& environment = {},
+                   const std::string& log = {}) {
+    std::vector<char*> words;
+    for (const std::string& word : command) words.push_back(const_cast<char*>(word.c_str()));
+    words.push_back(nullptr);
     pid_ = ::fork();
     if (pid_ != 0) return;
     for (const auto& [name, value] : environment) ::setenv(name.c_str(), value.c_str(), 1);
-    ::execl(program, "emberlockd", "--config", config.c_str(), nullptr);
+    if (!log.empty() && (std::freopen(log.c_str(), "w", stderr) == nullptr || ::dup2(2, 1) < 0)) ::_exit(126);
+    ::execv(words.front(), words.data());
     ::_exit(127);
   }
   Program(const Program&) = delete;
@@ -31,7 +40,6 @@ class Program {
   ~Program() {
     if (pid_ > 0) end(SIGKILL);
   }
-  [[nodiscard]] pid_t pid() const { return pid_; }
   /// Seconds of processors that it has used so far.
   [[nodiscard]] double processor_seconds() const {
     std::ifstream stat("/proc/" + std::to_string(pid_) + "/stat");
@@ -45,22 +53,25 @@ class Program {
     fields >> user >> system;
     return (user + system) / static_cast<double>(::sysconf(_SC_CLK_TCK));
   }
-  void tell(int signal) const {
+  void send(int signal) const {
     if (pid_ > 0) ::kill(pid_, signal);
   }
   /// Its exit status, or minus the signal that ended it.
-  int wait() {
-    int status = 0;
-    ::waitpid(pid_, &status, 0);
-    pid_ = -1;
-    return WIFEXITED(status) ? WEXITSTATUS(status) : -WTERMSIG(status);
-  }
+  int wait() { return status_of(0).value_or(-1); }
+  /// The same; none while it runs.
+  std::optional<int> ended() { return status_of(WNOHANG); }
   int end(int signal) {
-    tell(signal);
+    send(signal);
     return wait();
   }
 
  private:
+  std::optional<int> status_of(int options) {
+    int status = 0;
+    if (::waitpid(pid_, &status, options) != pid_) return std::nullopt;
+    pid_ = -1;
+    return WIFEXITED(status) ? WEXITSTATUS(status) : -WTERMSIG(status);
+  }
   pid_t pid_ = -1;
 };
 

@@ -5,11 +5,16 @@
 #include <functional>
 #include <thread>
 
+#include "base/quantity.h"
+
 namespace emberlock::test {
 
-/// Whether it comes true before a limit that no working machine needs.
-inline bool wait_until(const std::function<bool()>& condition,
-                       std::chrono::seconds limit = std::chrono::seconds(30)) {
+/// A limit that no working machine needs, however loaded: it only ends a test that would hang.
+constexpr std::chrono::seconds kHangLimit{30};
+constexpr Seconds kHangGuard{static_cast<double>(kHangLimit.count())};
+
+/// Whether the condition becomes true before the limit.
+inline bool wait_until(const std::function<bool()>& condition, std::chrono::seconds limit = kHangLimit) {
   const auto deadline = std::chrono::steady_clock::now() + limit;
   while (!condition()) {
     if (std::chrono::steady_clock::now() > deadline) return false;

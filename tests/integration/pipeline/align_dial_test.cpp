@@ -171,7 +171,7 @@ TEST(AlignDial, ARecordingReplaysToTheSameBits) {
   DialBench bench(small_rig(7), PartsPerMillion(2000));
   bench.options.align.policy = smear::AlignPolicy::timed;
   bench.rig->dial()->turn(Hertz(1438.6 / 60));
-  const auto lines = test::expect_replays(bench, "align_dial");
+  const auto lines = test::expect_replays(bench);
   ASSERT_FALSE(lines.empty());
   EXPECT_THAT(lines.back(), HasSubstr("\"dial\""));
   EXPECT_THAT(lines.back(), HasSubstr("\"aligned\":true"));

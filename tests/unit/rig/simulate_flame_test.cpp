@@ -18,17 +18,13 @@
 #include "recon/temperature/emitter.h"
 #include "recon/temperature/self_absorption.h"
 #include "session/reader.h"
+#include "tests/support/temp_folder.h"
 
 namespace emberlock::rig {
 namespace {
 
 class SimulateFlameTest : public testing::Test {
  protected:
-  SimulateFlameTest() {
-    std::filesystem::remove_all(folder_);
-    std::filesystem::create_directories(folder_);
-  }
-  ~SimulateFlameTest() override { std::filesystem::remove_all(folder_); }
   static SimulateOptions small() {
     SimulateOptions o;
     o.frames = 2;
@@ -85,7 +81,7 @@ class SimulateFlameTest : public testing::Test {
       most = std::max(most, *std::max_element(view.image->rgb.begin(), view.image->rgb.end()));
     return most;
   }
-  std::filesystem::path folder_ = std::filesystem::path(testing::TempDir()) / "simulate-flame";
+  const test::TempFolder folder_;
 };
 
 TEST_F(SimulateFlameTest, LeavesASessionAndItsTruth) {
@@ -182,8 +178,6 @@ TEST_F(SimulateFlameTest, TwiceTheExposureIsTwiceTheLight) {
   std::vector<float> most;
   for (const double ms : {0.5, 1.0}) {
     o.exposure = milliseconds(ms);
-    std::filesystem::remove_all(folder_);
-    std::filesystem::create_directories(folder_);
     ASSERT_TRUE(simulate_flame(o, folder_).ok());
     const recon::Volume volume = truth(0);
     most.push_back(*std::max_element(volume.emission.begin(), volume.emission.end()));

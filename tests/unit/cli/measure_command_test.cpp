@@ -54,7 +54,8 @@ class MeasureCommandTest : public testing::Test {
   const test::TempFolder root_;
 };
 
-TEST_F(MeasureCommandTest, SaysWhatABallRadiates) {
+using MeasureCommandSlow = MeasureCommandTest;
+TEST_F(MeasureCommandSlow, SaysWhatABallRadiates) {
   write("a.vdb", true);
   const auto result = run({(root_ / "a.vdb").string(), (root_ / "a.vdb").string(), "--target", "0,0,-1,0,0,1",
                            "--target-sphere", "0,0,0,0.5", "--out", (root_ / "out").string()});

@@ -158,7 +158,8 @@ TEST_F(ReconstructCommandTest, TemperaturesStandBesideTheSameColours) {
   EXPECT_NE(run(words).exit_code, 0);
 }
 
-TEST_F(ReconstructCommandTest, LinesAreTakenApartIntoGridsOfTheirOwn) {
+using ReconstructCommandSlow = ReconstructCommandTest;
+TEST_F(ReconstructCommandSlow, LinesAreTakenApartIntoGridsOfTheirOwn) {
   const fs::path file = root_ / "response.json.png";  // an input, for expect_refused()
   std::ofstream(file) << recon::to_json(test::response_of_the_ball());
   std::vector<std::string> words = {"--voxels",   "16",          "--device",   "cpu",

@@ -141,7 +141,8 @@ TEST_F(TradeoffCommandTest, ListsOutOfRangeAreRefused) {
   EXPECT_EQ(run({"tradeoff"}).exit_code, 2);
 }
 
-TEST_F(TradeoffCommandTest, ABudgetAndATargetOfReconstructArePlannedAndSaid) {
+using TradeoffCommandSlow = TradeoffCommandTest;
+TEST_F(TradeoffCommandSlow, ABudgetAndATargetOfReconstructArePlannedAndSaid) {
   const std::vector<std::string> words{"reconstruct", (root_ / "transforms.json").string(),
                                        "--out",       (root_ / "out").string(),
                                        "--hold-out",  "10",

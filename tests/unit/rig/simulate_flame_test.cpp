@@ -108,7 +108,8 @@ TEST_F(SimulateFlameTest, LeavesASessionAndItsTruth) {
   EXPECT_EQ(velocity->size(), 3 * temperature->size());
 }
 
-TEST_F(SimulateFlameTest, PicturesShowTheTruth) {
+using SimulateFlameSlow = SimulateFlameTest;
+TEST_F(SimulateFlameSlow, PicturesShowTheTruth) {
   SimulateOptions o = small();
   o.preset = recon::FlamePreset::torch;
   o.read_noise = 0;
@@ -142,7 +143,7 @@ TEST_F(SimulateFlameTest, SmokeIsLitByTheSun) {
   EXPECT_GT(most, 100);
 }
 
-TEST_F(SimulateFlameTest, AnAbsoluteResponseTellsTheLevels) {
+TEST_F(SimulateFlameSlow, AnAbsoluteResponseTellsTheLevels) {
   SimulateOptions o = small();
   o.read_noise = 0;
   o.response = response(500);
@@ -171,7 +172,7 @@ TEST_F(SimulateFlameTest, AnAbsoluteResponseTellsTheLevels) {
   EXPECT_NEAR(volume.emission[3 * p + 1], expected, 1e-3 * expected);
 }
 
-TEST_F(SimulateFlameTest, TwiceTheExposureIsTwiceTheLight) {
+TEST_F(SimulateFlameSlow, TwiceTheExposureIsTwiceTheLight) {
   SimulateOptions o = small();
   o.frames = 1;
   o.response = response(1e-6);
@@ -185,7 +186,7 @@ TEST_F(SimulateFlameTest, TwiceTheExposureIsTwiceTheLight) {
   EXPECT_NEAR(most[1] / most[0], 2, 1e-4);
 }
 
-TEST_F(SimulateFlameTest, LateCamerasFilmLaterAndSaySo) {
+TEST_F(SimulateFlameSlow, LateCamerasFilmLaterAndSaySo) {
   SimulateOptions o = small();
   o.preset = recon::FlamePreset::torch;
   o.read_noise = 0;
@@ -269,7 +270,7 @@ TEST_F(SimulateFlameTest, SaysHowManyCellsAreFinerThanThePictures) {
 }
 
 /// So that what is finer than a flame's slow settling costs no time in it.
-TEST_F(SimulateFlameTest, FineGridsBeginOnCoarseOnes) {
+TEST_F(SimulateFlameSlow, FineGridsBeginOnCoarseOnes) {
   SimulateOptions o = small();
   o.preset = recon::FlamePreset::two_plumes;
   o.frames = 1;
@@ -288,7 +289,7 @@ TEST_F(SimulateFlameTest, FineGridsBeginOnCoarseOnes) {
 
 /// A thin bright sheet, which coarse grids can't show, looks as if it took light. With 56 / m of extinction
 /// instead of 1 its emission was off by 68 %.
-TEST_F(SimulateFlameTest, ACandleIsNotTakenForAThickMedium) {
+TEST_F(SimulateFlameSlow, ACandleIsNotTakenForAThickMedium) {
   SimulateOptions o = small();
   o.frames = 1;
   o.cameras = 10;

@@ -16,8 +16,11 @@ class Interrupt {
     ctrl_c,           ///< SIGINT
     termination_too,  ///< and SIGTERM, by which mpirun and Slurm end what they started
   };
-  explicit Interrupt(Heeds heeds = Heeds::ctrl_c) : heeds_(heeds) {
+  using Clock = std::chrono::steady_clock;
+  using Now = Clock::time_point (*)();  ///< clock_gettime or less: a signal's handler calls it
+  explicit Interrupt(Heeds heeds = Heeds::ctrl_c, Now now = Clock::now) : heeds_(heeds) {
     asked_at_ = 0;
+    now_ = now;
     struct sigaction action {};
     action.sa_handler = ask;
     ::sigaction(SIGINT, &action, &before_);
@@ -35,10 +38,8 @@ class Interrupt {
   [[nodiscard]] static bool asked() { return asked_at_ != 0; }
 
  private:
-  using Clock = std::chrono::steady_clock;  // clock_gettime, which a handler may call
-
   static void ask(int signal) {
-    const Clock::rep now = Clock::now().time_since_epoch().count();
+    const Clock::rep now = now_.load()().time_since_epoch().count();
     Clock::rep first = 0;
     if (asked_at_.compare_exchange_strong(first, now) ||
         Clock::duration(now - first) <= std::chrono::seconds(1))
@@ -48,7 +49,9 @@ class Interrupt {
   }
 
   static inline std::atomic<Clock::rep> asked_at_ = 0;
-  static_assert(decltype(asked_at_)::is_always_lock_free, "a signal's handler sets it");
+  static inline std::atomic<Now> now_ = Clock::now;
+  static_assert(decltype(asked_at_)::is_always_lock_free && decltype(now_)::is_always_lock_free,
+                "a signal's handler uses both");
   Heeds heeds_;
   struct sigaction before_ {
   }, before_termination_{};

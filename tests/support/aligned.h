@@ -10,6 +10,7 @@
 #include "rig/align/json.h"
 #include "rig/align/record.h"
 #include "tests/support/small_rig.h"
+#include "tests/support/temp_folder.h"
 
 namespace emberlock::test {
 
@@ -25,10 +26,9 @@ inline void expect_aligned_in_truth(SmallBench& bench) {
 }
 
 /// Records an alignment, runs it again from the recording, and compares every line. Returns the lines.
-inline std::vector<std::string> expect_replays(SmallBench& bench, const std::string& name,
-                                               const rig::StopAsked& stop = {}) {
-  const std::filesystem::path folder = std::filesystem::path(testing::TempDir()) / name;
-  std::filesystem::remove_all(folder);
+inline std::vector<std::string> expect_replays(SmallBench& bench, const rig::StopAsked& stop = {}) {
+  const TempFolder temp;
+  const std::filesystem::path folder = temp / "session";
   std::vector<std::string> live;
   std::vector<std::string> again;
   const auto into = [](std::vector<std::string>& lines) {
@@ -39,7 +39,6 @@ inline std::vector<std::string> expect_replays(SmallBench& bench, const std::str
   const auto replayed = rig::replay_align(folder, into(again));
   EXPECT_TRUE(replayed.ok());
   EXPECT_EQ(live, again);
-  std::filesystem::remove_all(folder);
   return live;
 }
 

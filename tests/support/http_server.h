@@ -32,7 +32,7 @@ class HttpServerTest : public testing::Test {
     const daemon::HttpServerOptions usual;
     if (options.listen == usual.listen) options.listen = "127.0.0.1:0";
     // No client is cut off because the machine is busy.
-    if (options.patience == usual.patience) options.patience = Seconds(static_cast<double>(kHangGuard.count()));
+    if (options.patience == usual.patience) options.patience = kHangGuard;
     options.console = folder / "console";
     auto started = daemon::HttpServer::start(api, std::move(options));
     ASSERT_TRUE(started.ok()) << started.error().message();

@@ -13,7 +13,6 @@
 #include <memory>
 #include <stdexcept>
 #include <string>
-#include <thread>
 #include <vector>
 
 #include <sys/mman.h>
@@ -124,9 +123,9 @@ struct Before {
   std::uint64_t recorded, arrived, dropped;
 };
 
-/// Records into `folder` for `seconds`, and on until `moment` of each camera, if that is set. Then it calls
-/// `disaster` with the recorder's process id, and looks at what is left of the session in the folder that
-/// `disaster` names, by then salvaged. What was called recorded until then must be there.
+/// Records `seconds` of frames into `folder`, and on until `moment` of each camera, if that is set. Then it
+/// calls `disaster` with the recorder's process id, and looks at what is left of the session in the folder
+/// that `disaster` names, by then salvaged. What was called recorded until then must be there.
 inline TrialOutcome lose_a_recording(const std::filesystem::path& folder, const TrialFleet& fleet,
                                      double seconds,
                                      const std::function<std::filesystem::path(pid_t)>& disaster,
@@ -137,8 +136,16 @@ inline TrialOutcome lose_a_recording(const std::filesystem::path& folder, const 
   Told& told = *new (shared) Told;
   const pid_t child = ::fork();
   if (child == 0) film_until_killed(folder, fleet, told);
-  std::this_thread::sleep_for(std::chrono::duration<double>(seconds));
   TrialOutcome outcome;
+  const auto filmed = static_cast<std::uint64_t>(seconds * fleet.rate_hz);
+  const bool in_time = wait_until(
+      [&] {
+        return told.failed ||
+               std::all_of(told.cameras.begin(), told.cameras.begin() + fleet.cameras,
+                           [&](const Told::Camera& camera) { return camera.arrived >= filmed; });
+      },
+      kHangLimit + std::chrono::seconds(std::lround(seconds)));
+  if (!in_time) outcome.wrong = "the recorder doesn't film";
   std::vector<Before> before;
   const bool came = wait_until([&] {
     before.clear();

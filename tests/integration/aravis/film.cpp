@@ -41,7 +41,7 @@ void look_at(const Frame& frame, Film& film) {
 Film film_for(drivers::Camera& camera, Seconds time, std::uint64_t at_least) {
   const SteadyClock clock;
   const TimePoint until = clock.now() + time;
-  const TimePoint hangs = until + Seconds(static_cast<double>(test::kHangGuard.count()));
+  const TimePoint hangs = until + test::kHangGuard;
   Film film;
   while (clock.now() < until || (film.frames < at_least && clock.now() < hangs)) {
     const auto frame = camera.next_frame(milliseconds(200));

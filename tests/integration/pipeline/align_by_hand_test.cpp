@@ -213,7 +213,7 @@ TEST_F(AlignByHand, ARecordingReplaysToTheBitThoughPeoplePressedAndPulled) {
     if (asked == 100) plug.unplug_until(bench.align.clock->now() + Seconds(2));
     return asked > 900;
   };
-  const auto rounds = expect_replays(bench, "align_by_hand_replay", people);
+  const auto rounds = expect_replays(bench, people);
   EXPECT_GT(rounds.size(), 5U);
   EXPECT_THAT(rounds, Contains(HasSubstr("\"jumped\":")));
   EXPECT_THAT(rounds, Contains(HasSubstr("sends no frames")));

@@ -29,9 +29,9 @@ struct OffBy {
   std::uint64_t seed;
 };
 
-class DialIsOff : public testing::TestWithParam<OffBy> {};
+class DialIsOffSlow : public testing::TestWithParam<OffBy> {};
 
-TEST_P(DialIsOff, FromColdToLockedInTruth) {
+TEST_P(DialIsOffSlow, FromColdToLockedInTruth) {
   DialBench bench(small_rig(GetParam().seed), PartsPerMillion(GetParam().ppm));
   bench.options.align.policy = GetParam().policy;
   bool measured_right = true;
@@ -62,7 +62,7 @@ TEST_P(DialIsOff, FromColdToLockedInTruth) {
 }
 
 INSTANTIATE_TEST_SUITE_P(
-    AlignDial, DialIsOff,
+    AlignDial, DialIsOffSlow,
     testing::Values(OffBy{0, smear::AlignPolicy::densest, 7}, OffBy{50, smear::AlignPolicy::densest, 7},
                     OffBy{-300, smear::AlignPolicy::timed, 3}, OffBy{3000, smear::AlignPolicy::timed, 5},
                     OffBy{-3000, smear::AlignPolicy::densest, 2}, OffBy{0, smear::AlignPolicy::timed, 4}));
@@ -72,9 +72,9 @@ struct SetWrong {
   const char* way;
 };
 
-class DialIsSetWrong : public testing::TestWithParam<SetWrong> {};
+class DialIsSetWrongSlow : public testing::TestWithParam<SetWrong> {};
 
-TEST_P(DialIsSetWrong, IsToldWhichWayAndGoesOnOnceItIsTurned) {
+TEST_P(DialIsSetWrongSlow, IsToldWhichWayAndGoesOnOnceItIsTurned) {
   DialBench bench(small_rig(7));
   bench.options.align.policy = smear::AlignPolicy::timed;
   const Hertz wrong(GetParam().per_minute / 60);
@@ -101,14 +101,14 @@ TEST_P(DialIsSetWrong, IsToldWhichWayAndGoesOnOnceItIsTurned) {
   EXPECT_LT(bench.true_error(row), result->options.tolerance.in_rows(row) + kReadingError);
 }
 
-INSTANTIATE_TEST_SUITE_P(AlignDial, DialIsSetWrong,
+INSTANTIATE_TEST_SUITE_P(AlignDial, DialIsSetWrongSlow,
                          testing::Values(SetWrong{1510.5, "turn it down by"},
                                          SetWrong{1366.7, "turn it up by"}, SetWrong{719.3, "turn it up by"},
                                          SetWrong{2877.2, "turn it down by"},
                                          SetWrong{959.0, "turn it up by"},
                                          SetWrong{18000, "turn it down by"}));
 
-TEST(AlignDial, ADialThatIsOffByFivePerCentIsTurnedByWhatItIsOff) {
+TEST(AlignDialSlow, ADialThatIsOffByFivePerCentIsTurnedByWhatItIsOff) {
   DialBench bench(small_rig(4), PartsPerMillion(50000));
   bench.options.align.policy = smear::AlignPolicy::timed;
   const auto result = bench.run();
@@ -117,7 +117,7 @@ TEST(AlignDial, ADialThatIsOffByFivePerCentIsTurnedByWhatItIsOff) {
   EXPECT_NEAR(60 * bench.rig->dial()->shown().value(), 1438.6 / 1.05, 5);
 }
 
-TEST(AlignDial, ADarkOrFarTooSlowOrSteadyStrobeIsToldSo) {
+TEST(AlignDialSlow, ADarkOrFarTooSlowOrSteadyStrobeIsToldSo) {
   for (const double per_minute : {0.0, 200.0}) {
     DialBench bench(small_rig(4));
     if (per_minute > 0) bench.rig->dial()->turn(Hertz(per_minute / 60));
@@ -141,7 +141,7 @@ TEST(AlignDial, ADarkOrFarTooSlowOrSteadyStrobeIsToldSo) {
   }
 }
 
-TEST(AlignDial, IsTurnedInMidRunAndGoesOn) {
+TEST(AlignDialSlow, IsTurnedInMidRunAndGoesOn) {
   drivers::VirtualRigOptions setup = small_rig(2);
   setup.cameras[1].timing.frame_period = setup.cameras[0].timing.frame_period * (1 - 25e-6);
   setup.cameras[2].timing.frame_period = setup.cameras[0].timing.frame_period * (1 + 25e-6);
@@ -167,11 +167,11 @@ TEST(AlignDial, IsTurnedInMidRunAndGoesOn) {
   EXPECT_EQ(result->last.verdict, smear::AlignVerdict::aligned) << result->words.reason;
 }
 
-TEST(AlignDial, ARecordingReplaysToTheSameBits) {
+TEST(AlignDialSlow, ARecordingReplaysToTheSameBits) {
   DialBench bench(small_rig(7), PartsPerMillion(2000));
   bench.options.align.policy = smear::AlignPolicy::timed;
   bench.rig->dial()->turn(Hertz(1438.6 / 60));
-  const auto lines = test::expect_replays(bench, "align_dial");
+  const auto lines = test::expect_replays(bench);
   ASSERT_FALSE(lines.empty());
   EXPECT_THAT(lines.back(), HasSubstr("\"dial\""));
   EXPECT_THAT(lines.back(), HasSubstr("\"aligned\":true"));
@@ -189,9 +189,9 @@ struct TurnedCamera {
   std::size_t camera;
 };
 
-class DirectionIsSetWrong : public testing::TestWithParam<TurnedCamera> {};
+class DirectionIsSetWrongSlow : public testing::TestWithParam<TurnedCamera> {};
 
-TEST_P(DirectionIsSetWrong, TheCameraIsNamedByTheWalk) {
+TEST_P(DirectionIsSetWrongSlow, TheCameraIsNamedByTheWalk) {
   const auto [seed, ppm, camera] = GetParam();
   DialBench bench(small_rig(seed), PartsPerMillion(ppm));
   bench.options.align.policy = smear::AlignPolicy::timed;
@@ -203,10 +203,10 @@ TEST_P(DirectionIsSetWrong, TheCameraIsNamedByTheWalk) {
   EXPECT_THAT(result->words.reason, HasSubstr("set its read direction the other way round"));
 }
 
-INSTANTIATE_TEST_SUITE_P(AlignDial, DirectionIsSetWrong,
+INSTANTIATE_TEST_SUITE_P(AlignDial, DirectionIsSetWrongSlow,
                          testing::Values(TurnedCamera{7, 1000, 2}, TurnedCamera{1, -1000, 1}));
 
-TEST(AlignDial, OfTwoCamerasThatWalkApartNobodyCanSayWhichIsRight) {
+TEST(AlignDialSlow, OfTwoCamerasThatWalkApartNobodyCanSayWhichIsRight) {
   for (const double ppm : {200.0, 2000.0}) {
     DialBench bench(small_rig(7, 2), PartsPerMillion(ppm));
     bench.options.align.policy = smear::AlignPolicy::timed;
@@ -228,7 +228,7 @@ TEST(AlignDial, AGlobalShutterIsRefusedBeforeAnythingIsFilmed) {
   EXPECT_THAT(result.error().message(), HasSubstr("se a strobe that can be told"));
 }
 
-TEST(AlignDial, TheVerbSaysWhatToSetAndGoesOnOnceItIsSet) {
+TEST(AlignDialSlow, TheVerbSaysWhatToSetAndGoesOnOnceItIsSet) {
   const auto run = test::run_verb(
       add_align, {"align", "--rig", "virtual:3", "--strobe", "virtual-dial:error=300,at=1510.5", "--policy",
                   "timed", "--tolerance", "100rows"});

@@ -6,6 +6,7 @@
 #include "rig/align/run.h"
 #include "session/reader.h"
 #include "tests/support/aligned.h"
+#include "tests/support/temp_folder.h"
 
 namespace emberlock::cli {
 namespace {
@@ -69,19 +70,17 @@ TEST(AlignHold, FramesThatComeWhileNothingIsFilmedAreCountedAsPassedOver) {
     camera.first_phase = 0.6 * camera.timing.frame_period;
   SmallBench bench(setup);
   bench.options.hold = Seconds(120);
-  const auto folder = std::filesystem::path(testing::TempDir()) / "align_hold_counts";
-  std::filesystem::remove_all(folder);
-  const auto result = rig::record_align(folder, bench.align, bench.options);
+  const test::TempFolder folder;
+  const auto result = rig::record_align(folder / "session", bench.align, bench.options);
   ASSERT_TRUE(result.ok()) << result.error().message();
   ASSERT_GT(result->checks, 0);
   ASSERT_EQ(result->resets, 0);
-  const auto session = session::SessionReader::open(folder);
+  const auto session = session::SessionReader::open(folder / "session");
   ASSERT_TRUE(session.ok());
   for (const v1::CameraStream& camera : session->manifest().cameras()) {
     EXPECT_GT(camera.counts().passed_over(), 1000U);
     EXPECT_EQ(camera.counts().camera_gap(), 0U);
   }
-  std::filesystem::remove_all(folder);
 }
 
 TEST(AlignHold, EndsSoonWhenAskedTo) {
@@ -106,7 +105,7 @@ TEST(AlignHold, TheLimitOfRoundsCountsFromTheLastTimeAllWereIn) {
 TEST(AlignHold, ARecordingReplaysToTheBitThoughItWasStopped) {
   SmallBench bench = drifting_bench();
   int asked = 0;
-  const auto rounds = expect_replays(bench, "align_hold_replay", [&] { return ++asked > 1000; });
+  const auto rounds = expect_replays(bench, [&] { return ++asked > 1000; });
   EXPECT_GT(rounds.size(), 4U);
   EXPECT_THAT(rounds.back(), HasSubstr("\"aligned\":true"));
 }

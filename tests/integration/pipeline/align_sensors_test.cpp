@@ -169,7 +169,7 @@ TEST(AlignSensors, FlashesThatLightNothingInViewAreSaid) {
 TEST(AlignSensors, ARecordingOfThemReplaysToTheBit) {
   SmallBench bench(mixed_rig(6, {kCcd, kRolling, kGlobal}));
   bench.options.align.policy = smear::AlignPolicy::timed;
-  const auto rounds = expect_replays(bench, "align_sensors_replay");
+  const auto rounds = expect_replays(bench);
   EXPECT_THAT(rounds, testing::Each(HasSubstr("\"sensor\":\"global\"")));
   EXPECT_THAT(rounds, testing::Contains(HasSubstr("\"reset\":true")));
 }

@@ -12,7 +12,6 @@
 #include <opencv2/core.hpp>
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
-#include <unistd.h>
 
 #include "cli/commands.h"
 #include "recon/calibrate/board_pictures.h"
@@ -33,12 +32,7 @@ const fs::path kOpencvData = "/usr/share/doc/opencv-doc/examples/data";
 
 class CalibrateVerb : public testing::Test {
  protected:
-  void SetUp() override {
-    folder_ = fs::temp_directory_path() / ("emberlock_calibrate_test." + std::to_string(::getpid()));
-    fs::remove_all(folder_);
-    fs::create_directories(folder_ / "pictures");
-  }
-  void TearDown() override { fs::remove_all(folder_); }
+  void SetUp() override { fs::create_directories(folder_ / "pictures"); }
 
   void save(const Image& image, const fs::path& path) const {
     fs::create_directories(path.parent_path());
@@ -47,7 +41,7 @@ class CalibrateVerb : public testing::Test {
     ASSERT_TRUE(cv::imwrite(path.string(), all));
   }
 
-  fs::path folder_;
+  const test::TempFolder folder_;
 };
 
 test::BoardRigOptions two_cameras() {

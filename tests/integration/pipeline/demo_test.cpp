@@ -7,7 +7,6 @@
 #include <fstream>
 
 #include <gmock/gmock.h>
-#include <unistd.h>
 
 #include "base/file.h"
 #include "recon/adjust/picture_error.h"
@@ -15,6 +14,7 @@
 #include "report/demo_report.h"
 #include "rig/align/record.h"
 #include "session/reader.h"
+#include "tests/support/temp_folder.h"
 
 namespace emberlock::cli {
 namespace {
@@ -25,8 +25,7 @@ using testing::Not;
 class DemoTest : public testing::Test {
  protected:
   static void SetUpTestSuite() {
-    folder_ = fs::temp_directory_path() / ("emberlock_demo_test." + std::to_string(::getpid()));
-    fs::create_directories(folder_);
+    folder_ = new test::TempFolder;
     rig::DemoOptions options;
     options.cameras = 6;
     options.image = {320, 240};
@@ -34,19 +33,19 @@ class DemoTest : public testing::Test {
     options.voxels = 40;
     options.truth_voxels = 40;
     result_ = new Result<rig::DemoResult>(
-        rig::run_demo(options, folder_, [](const std::string&) { return Progress{}; }));
+        rig::run_demo(options, *folder_, [](const std::string&) { return Progress{}; }));
   }
   static void TearDownTestSuite() {
     delete result_;
-    fs::remove_all(folder_);
+    delete folder_;
   }
   void SetUp() override { ASSERT_TRUE(result_->ok()) << result_->error().message(); }
   static const rig::DemoResult& result() { return **result_; }
 
-  static fs::path folder_;
+  static test::TempFolder* folder_;
   static Result<rig::DemoResult>* result_;
 };
-fs::path DemoTest::folder_;
+test::TempFolder* DemoTest::folder_;
 Result<rig::DemoResult>* DemoTest::result_ = nullptr;
 
 TEST_F(DemoTest, EveryCameraEndsWithinTheToleranceInTruth) {
@@ -71,14 +70,14 @@ TEST_F(DemoTest, RowTimesAreMeasuredNotAssumed) {
 }
 
 TEST_F(DemoTest, TheRecordedAlignmentReplaysToTheSameEnd) {
-  const auto replayed = rig::replay_align(folder_ / "alignment");
+  const auto replayed = rig::replay_align(*folder_ / "alignment");
   ASSERT_TRUE(replayed.ok()) << replayed.error().message();
   EXPECT_EQ(replayed->resets, result().stages.back().result.resets);
   EXPECT_EQ(replayed->last.worst_pair, result().stages.back().result.last.worst_pair);
 }
 
 TEST_F(DemoTest, EveryFrameOfTheFlameIsRecordedAndReadable) {
-  auto session = session::SessionReader::open(folder_ / "flame");
+  auto session = session::SessionReader::open(*folder_ / "flame");
   ASSERT_TRUE(session.ok()) << session.error().message();
   ASSERT_EQ(session->camera_count(), 6U);
   for (std::size_t camera = 0; camera < 6; ++camera) {
@@ -99,31 +98,29 @@ TEST_F(DemoTest, TheUnseenViewIsPredictedBetterThanByThePapersSolver) {
 }
 
 TEST_F(DemoTest, TheReportStandsAlone) {
-  ASSERT_TRUE(report::write_demo_report(result(), folder_).ok());
-  std::string page = read_file(folder_ / "report.html").value();
+  ASSERT_TRUE(report::write_demo_report(result(), *folder_).ok());
+  std::string page = read_file(*folder_ / "report.html").value();
   for (std::size_t at = 0; (at = page.find("base64,", at)) != std::string::npos; ++at) {
     page.erase(at, page.find('"', at) - at);  // a picture's letters may spell anything
   }
   EXPECT_THAT(page, HasSubstr("held out"));
   EXPECT_THAT(page, Not(HasSubstr("http")));
   EXPECT_THAT(page, Not(HasSubstr("nan")));
-  EXPECT_TRUE(fs::exists(folder_ / "summary.png"));
-  EXPECT_TRUE(fs::exists(folder_ / "reconstruction" / "volume.vdb"));
+  EXPECT_TRUE(fs::exists(*folder_ / "summary.png"));
+  EXPECT_TRUE(fs::exists(*folder_ / "reconstruction" / "volume.vdb"));
 }
 
 TEST(Demo, OptionsOutOfRangeAreNamed) {
   rig::DemoOptions options;
   options.cameras = 2;
-  const auto r = rig::run_demo(options, fs::temp_directory_path() / "emberlock_never", {});
+  const auto r = rig::run_demo(options, "/nonexistent/never", {});
   ASSERT_FALSE(r.ok());
   EXPECT_EQ(r.error().kind, ErrorKind::bad_input);
   EXPECT_THAT(r.error().message(), HasSubstr("--cameras"));
 }
 
 TEST(DemoStopped, KeepsTheStepsThatAreDoneAndNamesThem) {
-  const fs::path folder =
-      fs::temp_directory_path() / ("emberlock_demo_stopped." + std::to_string(::getpid()));
-  fs::create_directories(folder);
+  const test::TempFolder folder;
   rig::DemoOptions options;
   options.cameras = 4;
   options.image = {320, 240};
@@ -144,13 +141,10 @@ TEST(DemoStopped, KeepsTheStepsThatAreDoneAndNamesThem) {
   EXPECT_THAT(result->kept[1], HasSubstr("flame/: 0 frames of 4 cameras"));
   EXPECT_TRUE(rig::replay_align(folder / "alignment").ok());
   EXPECT_TRUE(session::SessionReader::open(folder / "flame").ok());
-  fs::remove_all(folder);
 }
 
 TEST(DemoStopped, BeforeTheFirstStepIsDoneThereIsNothing) {
-  const fs::path folder =
-      fs::temp_directory_path() / ("emberlock_demo_stopped." + std::to_string(::getpid()));
-  fs::create_directories(folder);
+  const test::TempFolder folder;
   rig::DemoOptions options;
   options.cameras = 3;
   options.image = {320, 240};
@@ -159,7 +153,6 @@ TEST(DemoStopped, BeforeTheFirstStepIsDoneThereIsNothing) {
   ASSERT_TRUE(result.ok()) << result.error().message();
   EXPECT_FALSE(result->whole);
   EXPECT_TRUE(result->kept.empty());
-  fs::remove_all(folder);
 }
 
 }  // namespace

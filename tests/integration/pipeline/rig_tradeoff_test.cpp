@@ -7,10 +7,10 @@
 
 #include <gmock/gmock.h>
 #include <nlohmann/json.hpp>
-#include <unistd.h>
 
 #include "base/file.h"
 #include "cli/commands.h"
+#include "tests/support/temp_folder.h"
 #include "tests/support/verb.h"
 
 namespace emberlock::cli {
@@ -22,11 +22,6 @@ using testing::HasSubstr;
 
 class RigTradeoffCommandTest : public testing::Test {
  protected:
-  void SetUp() override {
-    root_ = fs::temp_directory_path() / ("emberlock_rig_tradeoff." + std::to_string(::getpid()));
-    fs::create_directories(root_);
-  }
-  void TearDown() override { fs::remove_all(root_); }
   /// A small sweep with further words.
   [[nodiscard]] test::VerbRun run(const std::vector<std::string>& more) const {
     std::vector<std::string> words{"tradeoff",     "rig",   "--out",        (root_ / "out").string(),
@@ -39,7 +34,7 @@ class RigTradeoffCommandTest : public testing::Test {
     return test::run_verb(add_tradeoff, words);
   }
   [[nodiscard]] std::string file(const char* name) const { return *read_file(root_ / "out" / name); }
-  fs::path root_;
+  const test::TempFolder root_;
 };
 
 TEST_F(RigTradeoffCommandTest, WritesThePageTheFiguresAndAllPoints) {

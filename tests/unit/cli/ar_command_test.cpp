@@ -116,7 +116,8 @@ TEST_F(ArCommandTest, AVideoHasTheFilmsRate) {
   EXPECT_NEAR(film->rate().value(), 30, 0.5);
 }
 
-TEST_F(ArCommandTest, WhatIsBeforeTheFlameHidesIt) {
+using ArCommandSlow = ArCommandTest;
+TEST_F(ArCommandSlow, WhatIsBeforeTheFlameHidesIt) {
   ASSERT_EQ(run_png({"--scale", "0.3", "--albedo", "0"}).exit_code, 0);
   const Eigen::Vector2d at = hand_at(3).project({0, 0, 0.021});
   const auto red = [&] {

@@ -7,7 +7,10 @@
 #include <vector>
 
 #include <gmock/gmock.h>
+#include <netinet/in.h>
+#include <sys/socket.h>
 
+#include "base/unique_fd.h"
 #include "cli/client.h"
 #include "cli/commands.h"
 #include "daemon/server/grpc_server.h"
@@ -132,8 +135,15 @@ TEST_F(ClientTls, OptionsThatAreWrongAreToldBeforeAnythingIsAsked) {
 }
 
 TEST_F(ClientTls, APortWhereNobodyListensAndANameThatLeadsNowhereAreUnreachable) {
-  serve({servers_.issue("localhost")});
-  server_.reset();
+  // A port that is taken, so that no other process listens there.
+  const UniqueFd taken(::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0));
+  sockaddr_in address{
+      .sin_family = AF_INET, .sin_port = 0, .sin_addr = {::htonl(INADDR_LOOPBACK)}, .sin_zero = {}};
+  auto* const as_address = reinterpret_cast<sockaddr*>(&address);
+  socklen_t size = sizeof address;
+  ASSERT_EQ(::bind(taken.get(), as_address, size), 0);
+  ASSERT_EQ(::getsockname(taken.get(), as_address, &size), 0);
+  where_ = "localhost:" + std::to_string(::ntohs(address.sin_port));
   const test::VerbRun nobody = status();
   EXPECT_EQ(nobody.exit_code, kUnreachable);
   EXPECT_THAT(nobody.err, AllOf(HasSubstr(where_), HasSubstr("Connection refused"), HasSubstr("`listen`")));

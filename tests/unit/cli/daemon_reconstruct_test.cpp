@@ -37,9 +37,9 @@ v1::DaemonStatus reconstructing(v1::ReconstructionStatus::State state, int itera
 
 TEST_F(DaemonReconstructVerbs, ReconstructShowsEveryIterationAndTheResult) {
   api_.on_reconstruct = [&](const v1::ReconstructRequest&) {
-    show_soon({reconstructing(v1::ReconstructionStatus::RUNNING, 1),
-               reconstructing(v1::ReconstructionStatus::RUNNING, 3),
-               reconstructing(v1::ReconstructionStatus::DONE, 4)});
+    show_in_turn(reconstructing(v1::ReconstructionStatus::RUNNING, 1),
+                 {{"iteration 1:", reconstructing(v1::ReconstructionStatus::RUNNING, 3)},
+                  {"iteration 3:", reconstructing(v1::ReconstructionStatus::DONE, 4)}});
     return Result<v1::ReconstructionStatus>(
         reconstructing(v1::ReconstructionStatus::RUNNING, 0).reconstruction());
   };
@@ -59,7 +59,7 @@ TEST_F(DaemonReconstructVerbs, ReconstructAsksForTemperaturesWithTheResponseItse
   api_.on_reconstruct = [&](const v1::ReconstructRequest&) {
     v1::DaemonStatus done = reconstructing(v1::ReconstructionStatus::DONE, 1);
     done.mutable_reconstruction()->add_temperature("1650 K on average");
-    show_soon({done});
+    api_.board().show(done);
     return Result<v1::ReconstructionStatus>(
         reconstructing(v1::ReconstructionStatus::RUNNING, 0).reconstruction());
   };
@@ -96,8 +96,8 @@ TEST_F(DaemonReconstructVerbs, ASequenceIsToldFrameByFrame) {
     return status;
   };
   api_.on_reconstruct = [&](const v1::ReconstructRequest&) {
-    show_soon({at(State::RUNNING, {State::DONE, State::RUNNING, State::STATE_UNSPECIFIED}),
-               at(State::FAILED, {State::DONE, State::FAILED, State::DONE})});
+    show_in_turn(at(State::RUNNING, {State::DONE, State::RUNNING, State::STATE_UNSPECIFIED}),
+                 {{"1 of 3", at(State::FAILED, {State::DONE, State::FAILED, State::DONE})}});
     return Result<v1::ReconstructionStatus>(at(State::RUNNING, {}).reconstruction());
   };
   const test::VerbRun result =
@@ -113,7 +113,7 @@ TEST_F(DaemonReconstructVerbs, ASequenceIsToldFrameByFrame) {
 
 TEST_F(DaemonReconstructVerbs, AReconstructionThatFailedSaysWhy) {
   api_.on_reconstruct = [&](const v1::ReconstructRequest&) {
-    show_soon({reconstructing(v1::ReconstructionStatus::FAILED, 1)});
+    api_.board().show(reconstructing(v1::ReconstructionStatus::FAILED, 1));
     return Result<v1::ReconstructionStatus>(
         reconstructing(v1::ReconstructionStatus::RUNNING, 0).reconstruction());
   };

@@ -33,7 +33,7 @@ TEST_F(DaemonRecordingVerbs, AlignShowsItsRoundsUntilItIsLocked) {
   locked.set_phase(v1::LOCKED);
   locked.set_reason("All within 40 rows.");
   api_.on_align = [&](const v1::AlignRequest&) {
-    show_soon({round, second, locked});
+    show_in_turn(round, {{"round 1", second}, {"round 2", locked}});
     return Status();
   };
   const test::VerbRun result = run(add_align, {"align", "--tolerance", "50rows"});
@@ -53,7 +53,7 @@ TEST_F(DaemonRecordingVerbs, AnAlignmentThatIsRefusedSaysWhatCouldBeMet) {
   offer.set_tolerance_rows(200);
   offer.set_tolerance_s(10.8e-3);
   api_.on_align = [&](const v1::AlignRequest&) {
-    show_soon({status_in(v1::ALIGNING), refused});
+    show_in_turn(status_in(v1::ALIGNING), {{"round 0", refused}});
     return Status();
   };
   const test::VerbRun result = run(add_align, {"align"});
@@ -78,7 +78,8 @@ v1::DaemonStatus recording(v1::RecordingStatus::State state, std::uint64_t frame
 
 TEST_F(DaemonRecordingVerbs, RecordFollowsToTheVerdict) {
   api_.on_record = [&](const v1::RecordRequest&) {
-    show_soon({recording(v1::RecordingStatus::RECORDING, 24), recording(v1::RecordingStatus::COMPLETE, 48)});
+    show_in_turn(recording(v1::RecordingStatus::RECORDING, 24),
+                 {{"24 frames", recording(v1::RecordingStatus::COMPLETE, 48)}});
     return Result<v1::RecordingStatus>(recording(v1::RecordingStatus::RECORDING, 0).recording());
   };
   const test::VerbRun result = run(add_record, {"record", "candle", "--seconds", "2", "--reconstruct"});
@@ -107,7 +108,7 @@ TEST_F(DaemonRecordingVerbs, LiveVolumesAreAskedForWithTheRecordingAndToldBeside
     live.set_volumes(11);
     live.set_skipped(109);
     live.set_device("cuda");
-    show_soon({running, recording(v1::RecordingStatus::COMPLETE, 480)});
+    show_in_turn(running, {{"240 frames", recording(v1::RecordingStatus::COMPLETE, 480)}});
     return Result<v1::RecordingStatus>(recording(v1::RecordingStatus::RECORDING, 0).recording());
   };
   const test::VerbRun result =
@@ -145,7 +146,7 @@ TEST_F(DaemonRecordingVerbs, ARecordingWhoseCountsDoNotAgreeIsAFailure) {
   api_.on_record = [&](const v1::RecordRequest&) {
     v1::DaemonStatus failed = recording(v1::RecordingStatus::FAILED, 47);
     failed.mutable_recording()->mutable_lost()->set_queue(1);
-    show_soon({failed});
+    api_.board().show(failed);
     return Result<v1::RecordingStatus>(recording(v1::RecordingStatus::RECORDING, 0).recording());
   };
   const test::VerbRun result = run(add_record, {"record", "candle", "--json"});
@@ -157,8 +158,8 @@ TEST_F(DaemonRecordingVerbs, ARecordingWhoseCountsDoNotAgreeIsAFailure) {
 
 TEST_F(DaemonRecordingVerbs, CtrlCEndsTheRecordingAndWaitsUntilItIsFinished) {
   api_.on_record = [&](const v1::RecordRequest&) {
-    soon(
-        {[&] { api_.board().show(recording(v1::RecordingStatus::RECORDING, 24)); }, [] { ::raise(SIGINT); }});
+    api_.board().show(recording(v1::RecordingStatus::RECORDING, 24));
+    in_turn({{[] { return test::has_printed("24 frames"); }, [] { ::raise(SIGINT); }}});
     return Result<v1::RecordingStatus>(recording(v1::RecordingStatus::RECORDING, 0).recording());
   };
   api_.on_stop_recording = [&] {
@@ -181,11 +182,11 @@ TEST_F(DaemonRecordingVerbs, ATakeThatIsLongerThanTheLockRenewsItFirstAndSaysSo)
   api_.board().show(locked(8.6));
   api_.on_align = [&](const v1::AlignRequest&) {
     api_.board().show(locked(8.5, v1::ALIGNING));
-    show_soon({locked(95)});
+    in_turn({{[&] { return server_->watchers() == 1; }, [&] { api_.board().show(locked(95)); }}});
     return Status();
   };
   api_.on_record = [&](const v1::RecordRequest&) {
-    show_soon({recording(v1::RecordingStatus::COMPLETE, 48)});
+    api_.board().show(recording(v1::RecordingStatus::COMPLETE, 48));
     return Result<v1::RecordingStatus>(recording(v1::RecordingStatus::RECORDING, 0).recording());
   };
   const test::VerbRun result = run(add_record, {"record", "candle", "--seconds", "20"});
@@ -203,7 +204,7 @@ TEST_F(DaemonRecordingVerbs, NoLockIsRenewedForATakeThatItHoldsForOrThatIsAskedF
   status.mutable_alignment()->set_time_left_s(30);
   api_.board().show(status);
   api_.on_record = [&](const v1::RecordRequest&) {
-    show_soon({recording(v1::RecordingStatus::COMPLETE, 48)});
+    api_.board().show(recording(v1::RecordingStatus::COMPLETE, 48));
     return Result<v1::RecordingStatus>(recording(v1::RecordingStatus::RECORDING, 0).recording());
   };
   for (const auto& words :

@@ -2,10 +2,9 @@
 // The verbs that ask emberlockd: what goes for all, and those that only look or set.
 #include "tests/support/daemon_verbs.h"
 
-#include <chrono>
+#include <csignal>
 #include <functional>
 #include <string>
-#include <thread>
 #include <utility>
 #include <vector>
 
@@ -19,6 +18,7 @@
 namespace emberlock::cli {
 namespace {
 using nlohmann::json;
+using test::has_printed;
 using test::status_in;
 using testing::ElementsAre;
 using testing::HasSubstr;
@@ -108,10 +108,8 @@ TEST_F(DaemonVerbs, StatusIsAScreenForPeopleAndJsonForPrograms) {
 
 TEST_F(DaemonVerbs, JobsAreListedWithTheNumbersThatCancelThem) {
   EXPECT_EQ(run(add_jobs, {"jobs"}).out, "No jobs.\n");
-  api_.on_job = [](const Observer& observer) -> daemon::JobResult {
-    while (observer(.5, "reads")) std::this_thread::sleep_for(std::chrono::milliseconds(1));
-    return Error{ErrorKind::refused, "ended early, as asked"};
-  };
+  test::EndlessJob endless;
+  api_.on_job = std::ref(endless);
   v1::SessionRequest candle;
   candle.set_session("candle");
   const auto job = api_.verify_session(candle);
@@ -129,7 +127,7 @@ TEST_F(DaemonVerbs, JobsAreListedWithTheNumbersThatCancelThem) {
   EXPECT_EQ(none.exit_code, 1);
   EXPECT_THAT(none.err, HasSubstr("job 7: there is none"));
   EXPECT_EQ(run(add_jobs, {"jobs", "cancel", "1"}).exit_code, 0);
-  const auto result = (*job)->wait(std::chrono::seconds(20));
+  const auto result = (*job)->wait(test::kHangLimit);
   ASSERT_TRUE(result.has_value());
   EXPECT_EQ(result->error().kind, ErrorKind::refused);
 }
@@ -185,10 +183,14 @@ TEST_F(DaemonVerbs, WatchFollowsStatusJournalAndIterations) {
   preview.set_reconstruction("candle 1");
   preview.mutable_iteration()->set_iteration(3);
   preview.set_rendered_jpeg("bytes");
-  soon({[&] { api_.board().notice(v1::AMBER, "cam2 is slow"); },
-        [&] { api_.board().show(std::make_shared<const v1::IterationPreview>(preview)); },
-        [&] { api_.board().show(status_in(v1::LOCKED, v1::GREEN, "All in tolerance.")); }});
-  const test::VerbRun result = run(add_watch, {"watch", "--seconds", "1.5", "--json"});
+  in_turn(
+      {{[] { return has_printed("{\"status\":"); }, [&] { api_.board().notice(v1::AMBER, "cam2 is slow"); }},
+       {[] { return has_printed("cam2 is slow"); },
+        [&] { api_.board().show(std::make_shared<const v1::IterationPreview>(preview)); }},
+       {[] { return has_printed("{\"iteration\":"); },
+        [&] { api_.board().show(status_in(v1::LOCKED, v1::GREEN, "All in tolerance.")); }},
+       {[] { return has_printed("All in tolerance."); }, [] { ::raise(SIGINT); }}});
+  const test::VerbRun result = run(add_watch, {"watch", "--json"});
   EXPECT_EQ(result.exit_code, 0) << result.err;
   EXPECT_THAT(result.out, HasSubstr("cam2 is slow"));
   EXPECT_THAT(result.out, HasSubstr("{\"iteration\":"));
@@ -196,33 +198,42 @@ TEST_F(DaemonVerbs, WatchFollowsStatusJournalAndIterations) {
   EXPECT_THAT(result.out, HasSubstr("All in tolerance."));
   std::istringstream lines(result.out);
   for (std::string line; std::getline(lines, line);) EXPECT_TRUE(json::accept(line)) << line;
+  EXPECT_EQ(run(add_watch, {"watch", "--seconds", "0.01"}).exit_code, 0) << "ends by itself";
 }
 
 TEST_F(DaemonVerbs, WatchBeginsWithNowAndNotWithWhatIsOver) {
   api_.board().notice(v1::AMBER, "cam1 was slow yesterday");
-  v1::IterationPreview old;
-  old.set_reconstruction("candle 1");
-  old.mutable_iteration()->set_iteration(7);
-  api_.board().show(std::make_shared<const v1::IterationPreview>(old));
-  std::this_thread::sleep_for(std::chrono::milliseconds(3));
+  const auto iterate = [&](std::uint32_t number) {
+    v1::IterationPreview preview;
+    preview.set_reconstruction("candle 1");
+    preview.mutable_iteration()->set_iteration(number);
+    api_.board().show(std::make_shared<const v1::IterationPreview>(preview));
+  };
+  iterate(7);
+  const std::string yesterday = utc_now();
+  ASSERT_TRUE(test::wait_until([&] { return utc_now() > yesterday; }));
   v1::DaemonStatus now = status_in(v1::LOCKED, v1::GREEN, "All in tolerance.");
   now.set_now_utc(utc_now());
   now.mutable_reconstruction()->set_id("candle 1");
   now.mutable_reconstruction()->set_state(v1::ReconstructionStatus::DONE);
   now.mutable_reconstruction()->add_iterations()->set_iteration(7);
   api_.board().show(now);
-  soon({[&] { api_.board().notice(v1::AMBER, "cam2 is slow today"); }});
-  const test::VerbRun result = run(add_watch, {"watch", "--seconds", "1"});
+  // Each stream is in order: what is over would come before what is new.
+  in_turn({{[] { return has_printed("All in tolerance."); },
+            [&] { api_.board().notice(v1::AMBER, "cam2 is slow today"); }},
+           {[] { return has_printed("cam2 is slow today"); }, [&] { iterate(8); }},
+           {[] { return has_printed("iteration 8"); }, [] { ::raise(SIGINT); }}});
+  const test::VerbRun result = run(add_watch, {"watch"});
   EXPECT_EQ(result.exit_code, 0) << result.err;
   EXPECT_THAT(result.out.substr(0, result.out.find('\n')), HasSubstr("locked, green: All in tolerance."));
   EXPECT_THAT(result.out, HasSubstr("cam2 is slow today"));
   EXPECT_THAT(result.out, Not(HasSubstr("yesterday")));
-  EXPECT_THAT(result.out, Not(HasSubstr("candle 1")));
+  EXPECT_THAT(result.out, Not(HasSubstr("iteration 7")));
 }
 
 TEST_F(DaemonVerbs, ADaemonThatGoesAwayWhileItIsWatchedIsToldApart) {
-  soon({[&] { server_.reset(); }});
-  const test::VerbRun result = run(add_watch, {"watch", "--seconds", "20"});
+  in_turn({{[&] { return server_->watchers() == 3; }, [&] { server_.reset(); }}});
+  const test::VerbRun result = run(add_watch, {"watch"});
   EXPECT_EQ(result.exit_code, kUnreachable);
   EXPECT_THAT(result.err, HasSubstr("went away"));
 }

@@ -6,12 +6,12 @@
 
 #include <gmock/gmock.h>
 #include <nlohmann/json.hpp>
-#include <unistd.h>
 
 #include "base/file.h"
 #include "cli/commands.h"
 #include "evaluate/error_law.h"
 #include "recon/calibrate/rig.h"
+#include "tests/support/temp_folder.h"
 #include "tests/support/verb.h"
 
 namespace emberlock::cli {
@@ -24,12 +24,9 @@ using testing::Not;
 class DesignVerb : public testing::Test {
  protected:
   void SetUp() override {
-    root_ = fs::temp_directory_path() / ("emberlock_design_test." + std::to_string(::getpid()));
-    fs::create_directories(root_);
     law_ = write("law.json", R"({"law": {"reach": 6, "spread": 0.1, "strength": {"views": 500, "pixels": 3e4,
                                 "noise": 2, "exposure": 900, "sync": 5000, "rest": 3}}})");
   }
-  void TearDown() override { fs::remove_all(root_); }
 
   [[nodiscard]] std::string write(const char* name, const std::string& text) const {
     std::ofstream(root_ / name) << text;
@@ -59,7 +56,7 @@ class DesignVerb : public testing::Test {
     EXPECT_TRUE(session::write_rig(root_ / "rig.json", rig).ok());
     return (root_ / "rig.json").string();
   }
-  fs::path root_;
+  const test::TempFolder root_;
   std::string law_;
 };
 

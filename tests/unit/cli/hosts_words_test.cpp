@@ -3,10 +3,8 @@
 // without devices.
 #include "cli/hosts_words.h"
 
-#include <chrono>
 #include <cstdint>
 #include <string>
-#include <thread>
 #include <tuple>
 #include <utility>
 #include <vector>
@@ -17,9 +15,8 @@
 #include "cli/commands.h"
 #include "cli/daemon_words.h"
 #include "session/writer.h"
-#include "tests/support/grpc_server.h"
+#include "tests/support/daemon_verbs.h"
 #include "tests/support/recording.h"
-#include "tests/support/verb.h"
 
 namespace emberlock::cli {
 namespace {
@@ -115,14 +112,7 @@ TEST(HostsWords, AListedSessionSaysWhereItsPartsAreAndWhoLedIt) {
   EXPECT_EQ(hosts_in_words(session), "led by dome at lab-1");
 }
 
-class HostsVerbs : public test::GrpcServerTest {
- protected:
-  HostsVerbs() { serve(); }
-  test::VerbRun run(test::AddVerb add, std::vector<std::string> words) const {
-    words.insert(words.end(), {"--daemon", "unix:" + socket.string()});
-    return test::run_verb(add, std::move(words));
-  }
-};
+using HostsVerbs = test::VerbsOfADaemon;
 
 TEST_F(HostsVerbs, StatusHasALineForEachHostPartAndCameraElsewhere) {
   v1::DaemonStatus status;
@@ -141,7 +131,7 @@ TEST_F(HostsVerbs, StatusHasALineForEachHostPartAndCameraElsewhere) {
   recording.set_session("candle");
   *recording.add_hosts() = part("lab-2:7143", v1::HostPart::WHOLE, 240);
   *recording.add_hosts() = part("lab-3:7143", v1::HostPart::MISSING, 0, "it doesn't answer");
-  api.board().show(status);
+  api_.board().show(status);
   const test::VerbRun screen = run(add_status, {"status"});
   EXPECT_EQ(screen.exit_code, 0) << screen.err;
   EXPECT_THAT(
@@ -159,7 +149,7 @@ TEST_F(HostsVerbs, StatusHasALineForEachHostPartAndCameraElsewhere) {
 TEST_F(HostsVerbs, StatusOfALendingHostSaysWhoHasItsCameras) {
   v1::DaemonStatus status;
   status.set_lent_to("dome at lab-1");
-  api.board().show(status);
+  api_.board().show(status);
   EXPECT_THAT(
       run(add_status, {"status"}).out,
       AllOf(HasSubstr("lent to    dome at lab-1: align and record there\n"), Not(HasSubstr("hosts\n"))));
@@ -181,7 +171,7 @@ TEST_F(HostsVerbs, RecordEndsWithTheOtherHostsPartsAndFailsWhereOneIsWanting) {
            {v1::HostPart::RECORDING, 0, "lab-2:7143: recording, 2 cameras, 240 frames, none lost\n"},
            {v1::HostPart::MISSING, 1, "lab-2:7143: missing, 2 cameras, 240 frames, none lost: gone\n"}}) {
     const v1::RecordingStatus last = recorded(v1::RecordingStatus::COMPLETE, state).recording();
-    api.on_stop_recording = [last] { return Result<v1::RecordingStatus>(last); };
+    api_.on_stop_recording = [last] { return Result<v1::RecordingStatus>(last); };
     const test::VerbRun stopped = run(add_record, {"record", "--stop"});
     EXPECT_EQ(stopped.exit_code, code) << words;
     EXPECT_THAT(stopped.out, testing::EndsWith("Every frame is accounted for.\n" + words));
@@ -191,24 +181,18 @@ TEST_F(HostsVerbs, RecordEndsWithTheOtherHostsPartsAndFailsWhereOneIsWanting) {
 
 TEST_F(HostsVerbs, RecordTellsOfTheOtherHostsAsItGoesOn) {
   const v1::DaemonStatus alone = recorded(v1::RecordingStatus::RECORDING, v1::HostPart::MISSING);
-  std::thread later;
-  api.on_record = [&](const v1::RecordRequest&) {
-    api.board().show(alone);
-    later = std::thread([&] {
-      std::this_thread::sleep_for(std::chrono::milliseconds(300));
-      api.board().show(recorded(v1::RecordingStatus::COMPLETE, v1::HostPart::WHOLE));
-    });
+  api_.on_record = [&](const v1::RecordRequest&) {
+    show_in_turn(alone, {{"1 missing", recorded(v1::RecordingStatus::COMPLETE, v1::HostPart::WHOLE)}});
     return Result<v1::RecordingStatus>(alone.recording());
   };
   const test::VerbRun result = run(add_record, {"record", "candle"});
-  later.join();
   EXPECT_EQ(result.exit_code, 0) << result.err;
   EXPECT_THAT(result.out, HasSubstr("queue 0 %; 1 other host: 1 missing\n"));
   EXPECT_THAT(result.out, testing::EndsWith("lab-2:7143: whole, 2 cameras, 240 frames, none lost\n"));
 }
 
 TEST_F(HostsVerbs, SessionsListMarksWhatHasPartsElsewhere) {
-  api.on_list_sessions = [] {
+  api_.on_list_sessions = [] {
     v1::ListSessionsResponse response;
     v1::ListSessionsResponse::Entry& led = *response.add_sessions();
     led.set_session("led");

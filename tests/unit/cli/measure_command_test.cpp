@@ -6,10 +6,10 @@
 #include <vector>
 
 #include <gmock/gmock.h>
-#include <unistd.h>
 
 #include "cli/commands.h"
 #include "recon/export/volume_file.h"
+#include "tests/support/temp_folder.h"
 #include "tests/support/verb.h"
 
 namespace emberlock::cli {
@@ -20,12 +20,6 @@ using testing::HasSubstr;
 /// A ball of 5 cm and 1500 K, of optical radius 0.5, as `reconstruct` would write it.
 class MeasureCommandTest : public testing::Test {
  protected:
-  void SetUp() override {
-    root_ = fs::temp_directory_path() / ("emberlock_measure_test." + std::to_string(::getpid()));
-    fs::create_directories(root_);
-  }
-  void TearDown() override { fs::remove_all(root_); }
-
   void write(const std::string& name, bool with_temperature, bool with_extinction = true) const {
     constexpr int kPoints = 33;
     recon::Volume volume;
@@ -57,10 +51,11 @@ class MeasureCommandTest : public testing::Test {
     words.insert(words.begin(), "measure");
     return test::run_verb(add_measure, std::move(words));
   }
-  fs::path root_;
+  const test::TempFolder root_;
 };
 
-TEST_F(MeasureCommandTest, SaysWhatABallRadiates) {
+using MeasureCommandSlow = MeasureCommandTest;
+TEST_F(MeasureCommandSlow, SaysWhatABallRadiates) {
   write("a.vdb", true);
   const auto result = run({(root_ / "a.vdb").string(), (root_ / "a.vdb").string(), "--target", "0,0,-1,0,0,1",
                            "--target-sphere", "0,0,0,0.5", "--out", (root_ / "out").string()});

@@ -21,6 +21,7 @@
 #include "recon/export/volume_file.h"
 #include "session/child_messages.h"
 #include "tests/support/glowing_flame.h"
+#include "tests/support/temp_folder.h"
 #include "tests/support/verb.h"
 
 namespace emberlock::cli {
@@ -33,14 +34,11 @@ using testing::HasSubstr;
 class ReconstructCommandTest : public testing::Test {
  protected:
   void SetUp() override {
-    root_ = fs::temp_directory_path() / ("emberlock_reconstruct_test." + std::to_string(::getpid()));
-    fs::create_directories(root_);
     document_ = {
         {"fl_x", 80}, {"box", {{"center", {0, 0, 0}}, {"size", {0.2, 0.2, 0.2}}}}, {"frames", json::array()}};
     for (int i = 0; i < 5; ++i) add_view(i);
     save();
   }
-  void TearDown() override { fs::remove_all(root_); }
 
   void add_view(int i) {
     const Eigen::Vector3d centre(0.5 * std::cos(1.3 * i), 0.5 * std::sin(1.3 * i), 0.1 * (i - 2));
@@ -83,7 +81,7 @@ class ReconstructCommandTest : public testing::Test {
       EXPECT_TRUE(name == "transforms.json" || name.ends_with(".png")) << name << " was left behind";
     }
   }
-  fs::path root_;
+  const test::TempFolder root_;
   json document_;
 };
 
@@ -160,7 +158,8 @@ TEST_F(ReconstructCommandTest, TemperaturesStandBesideTheSameColours) {
   EXPECT_NE(run(words).exit_code, 0);
 }
 
-TEST_F(ReconstructCommandTest, LinesAreTakenApartIntoGridsOfTheirOwn) {
+using ReconstructCommandSlow = ReconstructCommandTest;
+TEST_F(ReconstructCommandSlow, LinesAreTakenApartIntoGridsOfTheirOwn) {
   const fs::path file = root_ / "response.json.png";  // an input, for expect_refused()
   std::ofstream(file) << recon::to_json(test::response_of_the_ball());
   std::vector<std::string> words = {"--voxels",   "16",          "--device",   "cpu",

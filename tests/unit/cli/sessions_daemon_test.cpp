@@ -6,8 +6,7 @@
 #include "cli/client.h"
 #include "cli/commands.h"
 #include "session/job_messages.h"
-#include "tests/support/grpc_server.h"
-#include "tests/support/verb.h"
+#include "tests/support/daemon_verbs.h"
 
 namespace emberlock::cli {
 namespace {
@@ -15,17 +14,15 @@ using nlohmann::json;
 using testing::ElementsAre;
 using testing::HasSubstr;
 
-class SessionsOfDaemon : public test::GrpcServerTest {
+class SessionsOfDaemon : public test::VerbsOfADaemon {
  protected:
-  SessionsOfDaemon() { serve(); }
-  test::VerbRun run(std::vector<std::string> words) const {
+  [[nodiscard]] test::VerbRun run(std::vector<std::string> words) const {
     words.insert(words.begin(), "sessions");
-    words.insert(words.end(), {"--daemon", "unix:" + socket.string()});
-    return test::run_verb(add_sessions, std::move(words));
+    return VerbsOfADaemon::run(add_sessions, std::move(words));
   }
   /// Jobs end so.
   void end_with(const v1::JobOutcome& outcome) {
-    api.on_job = [outcome](const Observer& observer) -> daemon::JobResult {
+    api_.on_job = [outcome](const Observer& observer) -> daemon::JobResult {
       observer(0.5, "reads");
       return outcome;
     };
@@ -34,7 +31,7 @@ class SessionsOfDaemon : public test::GrpcServerTest {
 
 TEST_F(SessionsOfDaemon, AreListedWithWhatTheyLostAndWhyOneCanNotBeRead) {
   EXPECT_EQ(run({"list"}).out, "No sessions.\n");
-  api.on_list_sessions = [] {
+  api_.on_list_sessions = [] {
     v1::ListSessionsResponse response;
     v1::ListSessionsResponse::Entry& flame = *response.add_sessions();
     flame.set_session("flame 1");
@@ -86,7 +83,7 @@ TEST_F(SessionsOfDaemon, AreVerifiedRepairedAndExportedByTheirNames) {
   end_with(exported);
   EXPECT_EQ(run({"export", "flame"}).out, "/data/exports/flame/cam2: 8 frames\n");
   EXPECT_EQ(run({"export", "flame", "--format", "video"}).exit_code, 0);
-  EXPECT_THAT(api.calls(),
+  EXPECT_THAT(api_.calls(),
               ElementsAre("verify_session session: \"flame\"", "repair_session session: \"flame\"",
                           "export_session session: \"flame\" format: PNG",
                           "export_session session: \"flame\" format: VIDEO"));
@@ -103,7 +100,7 @@ TEST_F(SessionsOfDaemon, OneThatIsNotWholeIsTheExitCodeAndItsReport) {
 }
 
 TEST_F(SessionsOfDaemon, AJobThatCanNotBeginIsToldInTheDaemonsWords) {
-  api.on_begin =
+  api_.on_begin =
       Error{ErrorKind::bad_input, "no such session", "candle", "`emberlock sessions list` shows them"};
   const test::VerbRun result = run({"repair", "candle"});
   EXPECT_EQ(result.exit_code, 2);
@@ -112,7 +109,7 @@ TEST_F(SessionsOfDaemon, AJobThatCanNotBeginIsToldInTheDaemonsWords) {
 }
 
 TEST_F(SessionsOfDaemon, AJobThatFailsOnItsWayIsAFailureInTheDaemonsWords) {
-  api.on_job = [](const Observer& observer) -> daemon::JobResult {
+  api_.on_job = [](const Observer& observer) -> daemon::JobResult {
     for (int i = 0; i < 20; ++i) observer(.5, {});
     return Error{ErrorKind::io, "no space left on device", "exports/flame", "Free space"};
   };
@@ -127,7 +124,7 @@ TEST_F(SessionsOfDaemon, TheDaemonChoosesWhereItExports) {
   const test::VerbRun result = run({"export", "flame", "--out", "x"});
   EXPECT_EQ(result.exit_code, 2);
   EXPECT_THAT(result.err, HasSubstr("./flame"));
-  EXPECT_THAT(api.calls(), testing::IsEmpty());
+  EXPECT_THAT(api_.calls(), testing::IsEmpty());
 }
 
 }  // namespace

@@ -8,10 +8,10 @@
 
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
-#include <unistd.h>
 
 #include "cli/commands.h"
 #include "tests/support/smear_frames.h"
+#include "tests/support/temp_folder.h"
 #include "tests/support/verb.h"
 
 namespace emberlock::cli {
@@ -19,9 +19,6 @@ namespace {
 
 class SmearCommand : public testing::Test {
  protected:
-  SmearCommand() { std::filesystem::create_directories(folder_); }
-  ~SmearCommand() override { std::filesystem::remove_all(folder_); }
-
   std::string write_pgm(const std::string& name, const test::SmearScene& scene) {
     const Image image = scene.image({});
     std::ofstream file(folder_ / name, std::ios::binary);
@@ -41,8 +38,7 @@ class SmearCommand : public testing::Test {
     return test::run_verb(add_smear, std::move(arguments));
   }
 
-  std::filesystem::path folder_ =
-      std::filesystem::temp_directory_path() / ("emberlock_smear_" + std::to_string(::getpid()));
+  const test::TempFolder folder_;
 };
 
 test::SmearScene lamp() { return test::SmearScene(160, 480).disk(80.2, 200.4, 4, 3000); }

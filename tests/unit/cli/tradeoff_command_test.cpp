@@ -6,7 +6,6 @@
 
 #include <gmock/gmock.h>
 #include <nlohmann/json.hpp>
-#include <unistd.h>
 
 #include "base/file.h"
 #include "cli/commands.h"
@@ -16,6 +15,7 @@
 #include "recon/preprocess/radiance.h"
 #include "report/tradeoff_report.h"
 #include "tests/support/small_flame.h"
+#include "tests/support/temp_folder.h"
 #include "tests/support/verb.h"
 
 namespace emberlock::cli {
@@ -53,12 +53,7 @@ void write_scene(const fs::path& folder) {
 
 class TradeoffCommandTest : public testing::Test {
  protected:
-  void SetUp() override {
-    root_ = fs::temp_directory_path() / ("emberlock_tradeoff_test." + std::to_string(::getpid()));
-    fs::create_directories(root_);
-    write_scene(root_);
-  }
-  void TearDown() override { fs::remove_all(root_); }
+  void SetUp() override { write_scene(root_); }
 
   using Run = test::VerbRun;
   [[nodiscard]] static Run run(const std::vector<std::string>& words) {
@@ -78,7 +73,7 @@ class TradeoffCommandTest : public testing::Test {
     EXPECT_THAT(result.err, HasSubstr(words));
     EXPECT_FALSE(fs::exists(root_ / "out"));
   }
-  fs::path root_;
+  const test::TempFolder root_;
 };
 
 const std::vector<std::string> kSmall{"--hold-out",  "10",      "--voxels",     "16,8", "--views",  "0",
@@ -146,7 +141,8 @@ TEST_F(TradeoffCommandTest, ListsOutOfRangeAreRefused) {
   EXPECT_EQ(run({"tradeoff"}).exit_code, 2);
 }
 
-TEST_F(TradeoffCommandTest, ABudgetAndATargetOfReconstructArePlannedAndSaid) {
+using TradeoffCommandSlow = TradeoffCommandTest;
+TEST_F(TradeoffCommandSlow, ABudgetAndATargetOfReconstructArePlannedAndSaid) {
   const std::vector<std::string> words{"reconstruct", (root_ / "transforms.json").string(),
                                        "--out",       (root_ / "out").string(),
                                        "--hold-out",  "10",

@@ -5,12 +5,12 @@
 #include <string>
 
 #include <gmock/gmock.h>
-#include <unistd.h>
 
 #include "base/file.h"
 #include "cli/commands.h"
 #include "cli/viewer_file.h"
 #include "recon/export/volume_file.h"
+#include "tests/support/temp_folder.h"
 #include "tests/support/verb.h"
 
 namespace emberlock::cli {
@@ -22,7 +22,6 @@ using testing::HasSubstr;
 class ViewCommandTest : public testing::Test {
  protected:
   void SetUp() override {
-    root_ = fs::temp_directory_path() / ("emberlock_view_test." + std::to_string(::getpid()));
     fs::create_directories(root_ / "result");
     std::ofstream(root_ / "result" / "report.html") << "<p>";
     set_browser("0");
@@ -33,7 +32,6 @@ class ViewCommandTest : public testing::Test {
   void TearDown() override {
     ::setenv("PATH", path_.c_str(), 1);
     ::unsetenv("DISPLAY");
-    fs::remove_all(root_);
   }
   void set_browser(const std::string& exit_code) const {
     const fs::path browser = root_ / "xdg-open";
@@ -45,7 +43,7 @@ class ViewCommandTest : public testing::Test {
     return test::run_verb(add_view, {"view", what.string()});
   }
 
-  fs::path root_;
+  const test::TempFolder root_;
   std::string path_ = std::getenv("PATH");  // NOLINT(concurrency-mt-unsafe): one thread
 };
 

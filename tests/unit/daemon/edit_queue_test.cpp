@@ -37,7 +37,7 @@ class EditQueueTest : public testing::Test {
     if (end) child_ = std::move(*end);
   }
   using Answer = std::future<Result<v1::StylizationStatus>>;
-  static constexpr Seconds kPatience{static_cast<double>(test::kHangGuard.count())};
+  static constexpr Seconds kPatience = test::kHangGuard;
   Answer ask(v1::EditRequest request, Seconds longest = kPatience) {
     Answer answer = std::async(std::launch::async, [this, request = std::move(request), longest] {
       return queue_.ask(request, longest);

@@ -93,7 +93,7 @@ TEST_F(EngineThread, AJobTellsWhatCameOfIt) {
   request.set_session("old");
   const auto job = engine_->verify_session(request);
   ASSERT_TRUE(job.ok()) << job.error().message();
-  const auto result = (*job)->wait(test::kHangGuard);
+  const auto result = (*job)->wait(test::kHangLimit);
   ASSERT_TRUE(result && result->ok());
   EXPECT_TRUE((*result)->ok());
   EXPECT_EQ((*result)->verify().cameras(0).recorded(), (*result)->verify().cameras(0).good());
@@ -181,7 +181,7 @@ TEST_F(EngineThread, ASessionInSalvageIsShownAndRefusedForAllElseWhileARecording
   std::filesystem::remove(index);
   const auto verification = engine_->verify_session(session);
   ASSERT_TRUE(verification.ok());
-  EXPECT_TRUE((*verification)->wait(test::kHangGuard)->ok());
+  EXPECT_TRUE((*verification)->wait(test::kHangLimit)->ok());
 }
 
 TEST_F(EngineThread, EndedItRefusesWhatIsAskedAndStillFinishesItsRecording) {

@@ -99,7 +99,7 @@ TEST(JobsTest, PausedTheBackgroundStandsStillInTheMidstAndGoesOnAfterwards) {
   ASSERT_TRUE(wait_until([&] { return std::exchange(asked, asking.asked) == asking.asked; }));
   EXPECT_EQ(job->state().silent_s(), 0) << "it isn't to blame";
   // What somebody asked for goes on.
-  EXPECT_TRUE((*jobs.add({kVerifies, "b", done_at_once}))->wait(test::kHangGuard));
+  EXPECT_TRUE((*jobs.add({kVerifies, "b", done_at_once}))->wait(test::kHangLimit));
   asking.may_end = true;
   EXPECT_LE(asking.asked, asked + 1);
   jobs.resume();
@@ -157,7 +157,7 @@ TEST(JobsTest, ARecordingsEndGoesOnWhoeverWouldCancelIt) {
   ASSERT_FALSE(refused.ok());
   EXPECT_FALSE(refused.error().remedy.empty());
   asking.may_end = true;
-  EXPECT_TRUE((*job->wait(test::kHangGuard)).ok());
+  EXPECT_TRUE((*job->wait(test::kHangLimit)).ok());
 }
 
 TEST(JobsTest, TooManyThatWaitAreRefused) {
@@ -200,12 +200,12 @@ TEST(JobsTest, WhileTheyEndNothingNewIsTakenButARecordingsEnd) {
   const auto running = *jobs.add(asking.job("a", kVerifies));
   ASSERT_TRUE(wait_until([&] { return asking.asked > 0; }));
   jobs.end();
-  EXPECT_EQ(running->wait(test::kHangGuard)->error().kind, ErrorKind::refused);
+  EXPECT_EQ(running->wait(test::kHangLimit)->error().kind, ErrorKind::refused);
   const auto late = jobs.add({kSalvages, "b", after([&] { began = true; })});
   EXPECT_EQ(late.error().kind, ErrorKind::refused);
   const auto finish = jobs.add({v1::Job::FINISH, "c", done_at_once});
   ASSERT_TRUE(finish.ok());
-  EXPECT_TRUE((*finish)->wait(test::kHangGuard)->ok());
+  EXPECT_TRUE((*finish)->wait(test::kHangLimit)->ok());
   jobs.drain();
   EXPECT_FALSE(began);
 }
@@ -244,7 +244,7 @@ TEST(JobsTest, WhoWatchesHearsOfEachChangeUntilItStopsWatching) {
   ASSERT_TRUE(wait_until([&] { return asking.asked > asked + 2; }));
   EXPECT_EQ(changes, heard);
   asking.may_end = true;
-  ASSERT_TRUE(job->wait(test::kHangGuard));
+  ASSERT_TRUE(job->wait(test::kHangLimit));
   EXPECT_EQ(job->news(seen)->state(), v1::Job::DONE);
   EXPECT_TRUE(job->state().outcome().ok());
   EXPECT_FALSE(job->news(seen));

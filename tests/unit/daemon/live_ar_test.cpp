@@ -25,7 +25,7 @@ class LiveArTest : public testing::Test {
     std::ofstream(root_ / "results/candle/frame-9/volume.vdb") << "a volume";
     options_.program = root_ / "program";
     options_.results = root_ / "results";
-    options_.patience = Seconds(test::kHangGuard.count());
+    options_.patience = test::kHangGuard;
     camera_.id = "left";
     camera_.layout = {{8, 6}, PixelFormat::gray8, 8};
     camera_.calibration.emplace().set_fx(10);

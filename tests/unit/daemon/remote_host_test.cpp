@@ -28,7 +28,7 @@ using ::testing::HasSubstr;
 
 constexpr ImageLayout kLentLayout{{16, 8}, PixelFormat::gray8, 8};
 
-constexpr Seconds kPatience{static_cast<double>(test::kHangGuard.count())};
+constexpr Seconds kPatience = test::kHangGuard;
 
 Frame lent_frame(std::uint64_t id, TimePoint at = SteadyClock().now()) {
   return {{.frame_id = id, .device_time = {}, .system_time = {}, .monotonic_time = at},

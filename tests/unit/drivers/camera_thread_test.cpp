@@ -15,17 +15,20 @@
 #include <gtest/gtest.h>
 
 #include "base/clock.h"
+#include "tests/support/wait.h"
 
 namespace emberlock::drivers {
 namespace {
 
-using std::chrono::steady_clock;
+using test::kHangGuard;
+using test::wait_until;
 using ::testing::HasSubstr;
 using State = CameraThread::State;
 
-constexpr Seconds kSoon{5};  // far more than anything here takes
-const CameraThreadOptions kQuick{
-    .queue_frames = 4, .retry = milliseconds(10), .call_deadline = milliseconds(200)};
+/// No call of a camera that works is late, however loaded the machine.
+CameraThreadOptions quick(Seconds call_deadline = kHangGuard) {
+  return {.queue_frames = 4, .retry = milliseconds(10), .call_deadline = call_deadline};
+}
 
 /// A device on a desk: a test plugs it in and out, has it make frames, and hang.
 class Desk {
@@ -136,26 +139,33 @@ class DeskCamera final : public Camera {
 };
 
 struct CameraThreadTest : ::testing::Test {
+  explicit CameraThreadTest(Seconds call_deadline = kHangGuard)
+      : camera(std::make_unique<CameraThread>(std::make_unique<DeskCamera>(desk), quick(call_deadline))) {}
   std::shared_ptr<Desk> desk = std::make_shared<Desk>();
-  std::unique_ptr<CameraThread> camera =
-      std::make_unique<CameraThread>(std::make_unique<DeskCamera>(desk), kQuick);
+  std::unique_ptr<CameraThread> camera;
+};
 
-  void until(const std::function<bool()>& holds) const {
-    const auto give_up = steady_clock::now() + std::chrono::seconds(5);
-    bool held = false;
-    while (!(held = holds()) && steady_clock::now() < give_up)
-      std::this_thread::sleep_for(std::chrono::milliseconds(1));
-    ASSERT_TRUE(held);
+/// A camera whose calls are soon late.
+struct HangingCameraTest : CameraThreadTest {
+  explicit HangingCameraTest(Seconds call_deadline = milliseconds(200)) : CameraThreadTest(call_deadline) {
+    start();
   }
+  /// On a loaded machine the thread may be late itself.
+  void start() {
+    ASSERT_TRUE(wait_until([&] { return camera->start().ok(); }));
+  }
+};
+struct BusyCameraTest : HangingCameraTest {
+  BusyCameraTest() : HangingCameraTest(milliseconds(500)) {}
 };
 
 TEST_F(CameraThreadTest, ARecordingThatEndsGivesItsFramesAndThenSaysSoEachTime) {
   desk->make_frames(3);
   desk->ended = true;
   ASSERT_TRUE(camera->start().ok());
-  until([&] { return camera->state() == State::ended; });
-  for (std::uint64_t id = 0; id < 3; ++id) EXPECT_EQ(camera->next_frame(kSoon)->stamp.frame_id, id);
-  for (int i = 0; i < 3; ++i) EXPECT_EQ(camera->next_frame(kSoon).error().kind, ErrorKind::out_of_data);
+  ASSERT_TRUE(wait_until([&] { return camera->state() == State::ended; }));
+  for (std::uint64_t id = 0; id < 3; ++id) EXPECT_EQ(camera->next_frame(kHangGuard)->stamp.frame_id, id);
+  for (int i = 0; i < 3; ++i) EXPECT_EQ(camera->next_frame(Seconds(0)).error().kind, ErrorKind::out_of_data);
   desk->ended = false;
   ASSERT_TRUE(camera->start().ok());
   EXPECT_EQ(camera->state(), State::filming);
@@ -166,7 +176,7 @@ TEST_F(CameraThreadTest, ARecordingThatEndsGivesItsFramesAndThenSaysSoEachTime) 
 TEST_F(CameraThreadTest, FramesComeInOrderAndAreCountedAsTheyAreTaken) {
   ASSERT_TRUE(camera->start().ok());
   desk->make_frames(3);
-  for (std::uint64_t id = 0; id < 3; ++id) EXPECT_EQ(camera->next_frame(kSoon)->stamp.frame_id, id);
+  for (std::uint64_t id = 0; id < 3; ++id) EXPECT_EQ(camera->next_frame(kHangGuard)->stamp.frame_id, id);
   EXPECT_EQ(camera->counts(), (FrameCounts{.delivered = 3}));
   const auto none = camera->next_frame(milliseconds(5));
   ASSERT_FALSE(none.ok());
@@ -176,15 +186,15 @@ TEST_F(CameraThreadTest, FramesComeInOrderAndAreCountedAsTheyAreTaken) {
 TEST_F(CameraThreadTest, AFullQueueLosesItsOldestAndCountsThem) {
   ASSERT_TRUE(camera->start().ok());
   desk->make_frames(10);
-  until([&] { return camera->counts().queue == 6; });
-  for (std::uint64_t id = 6; id < 10; ++id) EXPECT_EQ(camera->next_frame(kSoon)->stamp.frame_id, id);
+  ASSERT_TRUE(wait_until([&] { return camera->counts().queue == 6; }));
+  for (std::uint64_t id = 6; id < 10; ++id) EXPECT_EQ(camera->next_frame(kHangGuard)->stamp.frame_id, id);
   EXPECT_EQ(camera->counts(), (FrameCounts{.delivered = 4, .queue = 6}));
 }
 
 TEST_F(CameraThreadTest, ACameraThatWentAwayIsSaidOnceAndFilmsOnWhenItIsBack) {
   ASSERT_TRUE(camera->start().ok());
   desk->plugged = false;
-  EXPECT_EQ(camera->next_frame(kSoon).error().kind, ErrorKind::device);
+  EXPECT_EQ(camera->next_frame(kHangGuard).error().kind, ErrorKind::device);
   EXPECT_EQ(camera->state(), State::lost);
   const auto away = camera->next_frame(milliseconds(30));
   ASSERT_FALSE(away.ok());
@@ -192,7 +202,7 @@ TEST_F(CameraThreadTest, ACameraThatWentAwayIsSaidOnceAndFilmsOnWhenItIsBack) {
   EXPECT_THAT(away.error().message(), HasSubstr("it has been away"));
   desk->make_frames(1);
   desk->plugged = true;
-  ASSERT_TRUE(camera->next_frame(kSoon).ok());
+  ASSERT_TRUE(camera->next_frame(kHangGuard).ok());
   EXPECT_EQ(camera->state(), State::filming);
   EXPECT_EQ(desk->starts, 2);
 }
@@ -200,73 +210,78 @@ TEST_F(CameraThreadTest, ACameraThatWentAwayIsSaidOnceAndFilmsOnWhenItIsBack) {
 TEST_F(CameraThreadTest, StoppedWhileItIsAwayItIsNotLookedForAnyMore) {
   ASSERT_TRUE(camera->start().ok());
   desk->plugged = false;
-  EXPECT_EQ(camera->next_frame(kSoon).error().kind, ErrorKind::device);
+  EXPECT_EQ(camera->next_frame(kHangGuard).error().kind, ErrorKind::device);
   camera->stop();
   desk->plugged = true;
-  std::this_thread::sleep_for(std::chrono::milliseconds(60));
+  const TimePoint enough = SteadyClock().now() + 6 * quick().retry;
+  do {  // what it does instead of searching
+    ASSERT_TRUE(camera->trim_rate(PartsPerMillion(1)).ok());
+  } while (SteadyClock().now() < enough);
   EXPECT_EQ(desk->starts, 1);
   EXPECT_EQ(camera->state(), State::idle);
 }
 
-TEST_F(CameraThreadTest, OneThatHangsIsQuarantinedUntilItGoesOn) {
-  ASSERT_TRUE(camera->start().ok());
+TEST_F(HangingCameraTest, OneThatHangsIsQuarantinedUntilItGoesOn) {
   desk->hang();
-  const auto began = steady_clock::now();
-  const auto hanging = camera->next_frame(kSoon);
+  const TimePoint began = SteadyClock().now();
+  const auto hanging = camera->next_frame(2 * kHangGuard);
   ASSERT_FALSE(hanging.ok());
   EXPECT_EQ(hanging.error().kind, ErrorKind::device);
   EXPECT_THAT(hanging.error().message(), HasSubstr("camera c7: it hangs"));
   EXPECT_THAT(hanging.error().message(), HasSubstr("in next_frame"));
-  EXPECT_LT(steady_clock::now() - began, std::chrono::seconds(2));
+  EXPECT_LT(SteadyClock().now() - began, kHangGuard) << "long before the deadline";
   EXPECT_EQ(camera->state(), State::quarantined);
   EXPECT_EQ(camera->trim_rate(PartsPerMillion(3)).error().kind, ErrorKind::device);
   desk->make_frames(1);
   desk->go_on();
-  until([&] { return camera->state() == State::filming; });
-  EXPECT_TRUE(camera->next_frame(kSoon).ok());
+  ASSERT_TRUE(wait_until([&] { return camera->state() == State::filming; }));
+  EXPECT_TRUE(camera->next_frame(kHangGuard).ok());
 }
 
-TEST_F(CameraThreadTest, OneThatComputesForTooLongDoesNotHang) {
-  ASSERT_TRUE(camera->start().ok());
+TEST_F(BusyCameraTest, OneThatComputesForTooLongDoesNotHang) {
   desk->computes = true;
-  until([&] { return camera->overworked(); });
+  ASSERT_TRUE(wait_until([&] { return camera->overworked(); }));
   EXPECT_EQ(camera->state(), State::filming);
   EXPECT_FALSE(camera->trouble());
   EXPECT_EQ(camera->next_frame(milliseconds(30)).error().kind, ErrorKind::timed_out);
   desk->computes = false;
-  until([&] { return !camera->overworked(); });
+  ASSERT_TRUE(wait_until([&] { return !camera->overworked(); }));
   desk->make_frames(1);
-  EXPECT_TRUE(camera->next_frame(kSoon).ok());
+  EXPECT_TRUE(camera->next_frame(kHangGuard).ok());
 }
 
-TEST_F(CameraThreadTest, OneThatHangsForGoodIsLeftBehindInBoundedTime) {
-  ASSERT_TRUE(camera->start().ok());
+TEST_F(HangingCameraTest, OneThatHangsForGoodIsLeftBehindInBoundedTime) {
   desk->hang();
-  EXPECT_FALSE(camera->next_frame(kSoon).ok());
-  const auto began = steady_clock::now();
+  EXPECT_FALSE(camera->next_frame(kHangGuard).ok());
+  const TimePoint began = SteadyClock().now();
   camera->stop();
   camera.reset();
-  EXPECT_LT(steady_clock::now() - began, std::chrono::seconds(2));
+  EXPECT_LT(SteadyClock().now() - began, kHangGuard);
   EXPECT_EQ(desk->alive, 1);
   desk->go_on();
-  until([&] { return desk->alive == 0; });
+  ASSERT_TRUE(wait_until([&] { return desk->alive == 0; }));
 }
 
 TEST_F(CameraThreadTest, AResetReturnsBeforeItsInstantAndNoFrameOfTheOldPhaseIsHandedOn) {
   ASSERT_TRUE(camera->start().ok());
   desk->make_frames(2);
-  EXPECT_TRUE(camera->next_frame(kSoon).ok());
-  const TimePoint at = SteadyClock().now() + milliseconds(150);
-  ASSERT_TRUE(camera->reset_shutter(at).ok());
-  EXPECT_LT(SteadyClock().now(), at);
+  EXPECT_TRUE(camera->next_frame(kHangGuard).ok());
+  const TimePoint never = SteadyClock().now() + 2 * kHangGuard;
+  ASSERT_TRUE(camera->reset_shutter(never).ok());
+  EXPECT_LT(SteadyClock().now(), never);
   desk->make_frames(3);  // before the instant
-  until([&] { return camera->counts().passed_over == 4; });
-  until([&] { return desk->resets == 1; });
+  ASSERT_TRUE(wait_until([&] { return camera->counts().passed_over == 4; }));
+  EXPECT_EQ(desk->resets, 0);
+  camera->stop();
+  ASSERT_TRUE(camera->start().ok());
+  const TimePoint at = SteadyClock().now() + milliseconds(50);
+  ASSERT_TRUE(camera->reset_shutter(at).ok());
+  ASSERT_TRUE(wait_until([&] { return desk->resets == 1; }));
   EXPECT_GE(desk->reset_at.load(), at.ns);
-  until([&] {
+  EXPECT_TRUE(wait_until([&] {
     desk->make_frames(1);
     return camera->next_frame(milliseconds(20)).ok();
-  });
+  }));
   const FrameCounts counts = camera->counts();
   EXPECT_EQ(counts.delivered, 2);
   EXPECT_GE(counts.passed_over, 4);
@@ -274,7 +289,7 @@ TEST_F(CameraThreadTest, AResetReturnsBeforeItsInstantAndNoFrameOfTheOldPhaseIsH
 
 TEST_F(CameraThreadTest, OthersAreHeardWhileAResetWaitsForItsInstant) {
   ASSERT_TRUE(camera->start().ok());
-  ASSERT_TRUE(camera->reset_shutter(SteadyClock().now() + Seconds(60)).ok());
+  ASSERT_TRUE(camera->reset_shutter(SteadyClock().now() + 2 * kHangGuard).ok());
   EXPECT_TRUE(camera->trim_rate(PartsPerMillion(7)).ok());
   EXPECT_EQ(desk->trimmed, 7);
   camera->stop();
@@ -282,7 +297,7 @@ TEST_F(CameraThreadTest, OthersAreHeardWhileAResetWaitsForItsInstant) {
   EXPECT_EQ(camera->state(), State::idle);
   ASSERT_TRUE(camera->start().ok());
   desk->make_frames(1);
-  EXPECT_TRUE(camera->next_frame(kSoon).ok());
+  EXPECT_TRUE(camera->next_frame(kHangGuard).ok());
   EXPECT_EQ(desk->resets, 0);
 }
 
@@ -290,7 +305,7 @@ TEST_F(CameraThreadTest, AResetThatFailsIsSaidOnceByTheNextFrame) {
   ASSERT_TRUE(camera->start().ok());
   desk->refuses_resets = true;
   ASSERT_TRUE(camera->reset_shutter(SteadyClock().now()).ok());
-  EXPECT_THAT(camera->next_frame(kSoon).error().message(), HasSubstr("it refuses the reset"));
+  EXPECT_THAT(camera->next_frame(kHangGuard).error().message(), HasSubstr("it refuses the reset"));
   const auto next = camera->next_frame(milliseconds(30));
   EXPECT_TRUE(next.ok() || next.error().kind == ErrorKind::timed_out) << next.error().message();
 }
@@ -298,27 +313,27 @@ TEST_F(CameraThreadTest, AResetThatFailsIsSaidOnceByTheNextFrame) {
 TEST_F(CameraThreadTest, WhatIsAwayCannotBeReset) {
   ASSERT_TRUE(camera->start().ok());
   desk->plugged = false;
-  EXPECT_EQ(camera->next_frame(kSoon).error().kind, ErrorKind::device);
+  EXPECT_EQ(camera->next_frame(kHangGuard).error().kind, ErrorKind::device);
   EXPECT_EQ(camera->reset_shutter({}).error().kind, ErrorKind::timed_out);
 }
 
-TEST_F(CameraThreadTest, StoppedWhileItHangsItIsStoppedWhenItGoesOn) {
-  ASSERT_TRUE(camera->start().ok());
+TEST_F(HangingCameraTest, StoppedWhileItHangsItIsStoppedWhenItGoesOn) {
   desk->hang();
-  EXPECT_FALSE(camera->next_frame(kSoon).ok());
+  EXPECT_FALSE(camera->next_frame(kHangGuard).ok());
   camera->stop();
   EXPECT_EQ(desk->stops, 0);
   desk->make_frames(1);
   desk->go_on();
-  until([&] { return desk->stops == 1; });
+  ASSERT_TRUE(wait_until([&] { return desk->stops == 1; }));
   EXPECT_EQ(camera->state(), State::idle);
-  ASSERT_TRUE(camera->start().ok());
-  EXPECT_EQ(camera->next_frame(milliseconds(20)).error().kind, ErrorKind::timed_out);  // frame 0 was nobody's
+  start();
+  EXPECT_EQ(camera->next_frame(milliseconds(20)).error().kind, ErrorKind::timed_out)
+      << "frame 0 was passed over";
   EXPECT_EQ(camera->counts().passed_over, 1);
 }
 
 TEST_F(CameraThreadTest, AShutterThatCannotBeResetIsRefusedAtOnce) {
-  CameraThread fixed(std::make_unique<DeskCamera>(desk, ShutterReset::none), kQuick);
+  CameraThread fixed(std::make_unique<DeskCamera>(desk, ShutterReset::none), quick());
   ASSERT_TRUE(fixed.start().ok());
   EXPECT_THAT(fixed.reset_shutter({}).error().message(), HasSubstr("can't be reset"));
 }
@@ -327,23 +342,23 @@ TEST_F(CameraThreadTest, FramesPassedOverAreSaidAndCounted) {
   ASSERT_TRUE(camera->start().ok());
   desk->make_frames(3);
   std::uint64_t passed = 0;
-  until([&] { return (passed += camera->pass_over(SteadyClock().now())) == 3; });
+  ASSERT_TRUE(wait_until([&] { return (passed += camera->pass_over(SteadyClock().now())) == 3; }));
   desk->make_frames(1);
-  EXPECT_EQ(camera->next_frame(kSoon)->stamp.frame_id, 3);
+  EXPECT_EQ(camera->next_frame(kHangGuard)->stamp.frame_id, 3);
   EXPECT_EQ(camera->counts(), (FrameCounts{.delivered = 1, .passed_over = 3}));
 }
 
 TEST_F(CameraThreadTest, StopDropsWhatWaits) {
   ASSERT_TRUE(camera->start().ok());
   desk->make_frames(6);
-  until([&] { return camera->counts().queue == 2; });  // all six have come, four wait
+  ASSERT_TRUE(wait_until([&] { return camera->counts().queue == 2; }));  // all six have come, four wait
   camera->stop();
   EXPECT_EQ(desk->stops, 1);
   EXPECT_EQ(camera->counts(), (FrameCounts{.queue = 2, .passed_over = 4}));
   EXPECT_EQ(camera->next_frame(milliseconds(5)).error().kind, ErrorKind::device);
   ASSERT_TRUE(camera->start().ok());
   desk->make_frames(1);
-  EXPECT_EQ(camera->next_frame(kSoon)->stamp.frame_id, 6);
+  EXPECT_EQ(camera->next_frame(kHangGuard)->stamp.frame_id, 6);
 }
 
 TEST_F(CameraThreadTest, TrimsReachTheCamera) {

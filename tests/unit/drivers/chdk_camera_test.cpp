@@ -2,8 +2,6 @@
 // The camera whose frames are a live view, in virtual time.
 #include "drivers/ptp/chdk_camera.h"
 
-#include <filesystem>
-#include <fstream>
 #include <functional>
 #include <memory>
 #include <string>
@@ -12,10 +10,12 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <unistd.h>
 
+#include "base/file.h"
 #include "drivers/virtual/virtual_clock.h"
 #include "tests/support/chdk_responder/fake_transport.h"
+#include "tests/support/temp_folder.h"
+#include "tests/support/wait.h"
 
 namespace emberlock::drivers {
 namespace {
@@ -193,40 +193,41 @@ TEST(ChdkCamera, AResetDuringAMovieLeavesAMovieRunning) {
 
 TEST(ChdkCamera, APowerCycleByTheUsersCommandIsSeenThrough) {
   Studio studio;
-  const auto note =
-      std::filesystem::temp_directory_path() / ("emberlock_power_" + std::to_string(::getpid()));
+  const test::TempFolder folder;
+  const auto note = folder / "note";
   auto camera = studio.filming(
       {.format = PixelFormat::gray8,
        .controls = {{"reset", "power"}, {"power_command", "echo $EMBERLOCK_CAMERA >" + note.string()}}});
   ASSERT_TRUE(studio.frame(*camera, Seconds(1)).ok());
   ASSERT_TRUE(camera->reset_shutter(studio.clock->now()).ok());
   // The command's process takes real time, which doesn't pass on the clock of the camera.
-  for (int i = 0; i < 2000 && !std::filesystem::exists(note); ++i) ::usleep(1000);
+  EXPECT_TRUE(test::wait_until([&] {
+    const auto named = read_file(note);
+    return named.ok() && *named == "EMBER0001\n";
+  }));
   studio.unplug();
-  for (int i = 0; i < 20; ++i) {
-    EXPECT_EQ(camera->next_frame(milliseconds(20)).error().kind, ErrorKind::timed_out);
-    ::usleep(1000);
-  }
+  // The camera drops the dead connection as soon as the process has ended.
+  EXPECT_TRUE(test::wait_until([&] {
+    EXPECT_EQ(camera->next_frame(Seconds(0)).error().kind, ErrorKind::timed_out);
+    return studio.cable->transports == 0;
+  }));
+  EXPECT_EQ(camera->next_frame(milliseconds(20)).error().kind, ErrorKind::timed_out);
   studio.cable->plugged = true;
   const auto frame = studio.frame(*camera, Seconds(5));
   ASSERT_TRUE(frame.ok()) << frame.error().message();
   EXPECT_EQ(phase_shown(*frame), studio.device().phase_draws());
-  std::string camera_named;
-  std::ifstream(note) >> camera_named;
-  EXPECT_EQ(camera_named, "EMBER0001");
-  std::filesystem::remove(note);
 }
 
 TEST(ChdkCamera, APowerCommandThatFailsIsAnError) {
   Studio studio;
   auto camera = studio.filming({.controls = {{"reset", "power"}, {"power_command", "exit 3"}}});
   Status said = camera->reset_shutter(studio.clock->now());
-  for (int i = 0; said.ok() && i < 2000; ++i) {
-    ::usleep(1000);
-    const auto frame = camera->next_frame(milliseconds(1));
+  ASSERT_TRUE(test::wait_until([&] {
+    if (!said.ok()) return true;
+    const auto frame = camera->next_frame(Seconds(0));
     if (!frame.ok() && frame.error().kind == ErrorKind::device) said = frame.error();
-  }
-  ASSERT_FALSE(said.ok());
+    return false;
+  }));
   EXPECT_THAT(said.error().message(), HasSubstr("power command failed"));
 }
 

@@ -13,6 +13,7 @@
 #include <unistd.h>
 
 #include "base/unique_fd.h"
+#include "tests/support/temp_folder.h"
 
 namespace emberlock::drivers {
 namespace {
@@ -106,9 +107,8 @@ class Opener {
 class HolderOf : public testing::Test {
  protected:
   void SetUp() override { ASSERT_TRUE(UniqueFd(::open(file_.c_str(), O_RDWR | O_CREAT, 0600))); }
-  void TearDown() override { std::filesystem::remove(file_); }
-  const std::filesystem::path file_ =
-      std::filesystem::temp_directory_path() / ("emberlock_held_" + std::to_string(::getpid()));
+  const test::TempFolder folder_;
+  const std::filesystem::path file_ = folder_ / "device";
 };
 
 TEST_F(HolderOf, AnotherProcessIsNamedOurselvesAreNot) {

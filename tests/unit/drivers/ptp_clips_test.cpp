@@ -10,11 +10,11 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <unistd.h>
 
 #include "base/file.h"
 #include "drivers/ptp/clips.h"
 #include "tests/support/chdk_responder/bench.h"
+#include "tests/support/temp_folder.h"
 
 namespace emberlock::drivers {
 namespace {
@@ -26,12 +26,6 @@ using testing::HasSubstr;
 
 class PtpClips : public testing::Test {
  protected:
-  PtpClips() : folder_(fs::temp_directory_path() / ("emberlock_clips_" + std::to_string(::getpid()))) {
-    fs::create_directories(folder_);
-    handle_ = bench_.device().add_object({"MVI_0001.AVI", 0x300a, kBytes, 0});
-  }
-  ~PtpClips() override { fs::remove_all(folder_); }
-
   [[nodiscard]] fs::path target() const { return folder_ / "MVI_0001.AVI"; }
   [[nodiscard]] fs::path part() const { return folder_ / "MVI_0001.AVI.part"; }
   Clip clip() { return list_clips(bench_.session).value().at(0); }
@@ -59,8 +53,8 @@ class PtpClips : public testing::Test {
 
   static constexpr std::uint32_t kBytes = 3'000'001;
   OpenBench bench_;
-  std::uint32_t handle_;
-  fs::path folder_;
+  std::uint32_t handle_ = bench_.device().add_object({"MVI_0001.AVI", 0x300a, kBytes, 0});
+  test::TempFolder folder_;
 };
 
 TEST_F(PtpClips, ListsMoviesOfAllFoldersByNameAndNothingElse) {

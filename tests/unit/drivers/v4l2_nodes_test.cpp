@@ -3,9 +3,9 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <unistd.h>
 
 #include "drivers/v4l2/nodes.h"
+#include "tests/support/temp_folder.h"
 
 namespace emberlock::drivers {
 namespace {
@@ -15,7 +15,6 @@ namespace fs = std::filesystem;
 class V4l2Nodes : public testing::Test {
  protected:
   V4l2Nodes() { fs::create_directories(root_ / "class/video4linux"); }
-  ~V4l2Nodes() override { fs::remove_all(root_); }
 
   static void write(const fs::path& file, const std::string& text) { std::ofstream(file) << text << '\n'; }
   /// A node of a device's folder below /sys/devices; its number among the device's nodes.
@@ -40,7 +39,7 @@ class V4l2Nodes : public testing::Test {
     return all;
   }
 
-  fs::path root_ = fs::path(testing::TempDir()) / ("v4l2_nodes_" + std::to_string(::getpid()));
+  const test::TempFolder root_;
   const fs::path hub_ = "pci0000:00/0000:00:14.0/usb3/3-1";
 };
 

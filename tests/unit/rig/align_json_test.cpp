@@ -9,6 +9,7 @@
 #include "rig/align/settings_proto.h"
 #include "tests/support/old_alignment.h"
 #include "tests/support/small_rig.h"
+#include "tests/support/temp_folder.h"
 
 namespace emberlock::rig {
 namespace {
@@ -112,7 +113,8 @@ TEST(AlignJson, WhatIsNotKnownIsNull) {
 
 TEST(AlignDelays, AreWrittenAndReadBackByCameraId) {
   const test::SmallBench bench(test::small_rig(1, 3));
-  const auto file = std::filesystem::path(testing::TempDir()) / "align_delays.json";
+  const test::TempFolder folder;
+  const auto file = folder / "align_delays.json";
   const std::vector<std::optional<smear::ResetDelay>> delays{
       smear::ResetDelay{milliseconds(5), milliseconds(0.2)}, std::nullopt,
       smear::ResetDelay{milliseconds(7), milliseconds(0.1)}};
@@ -126,7 +128,8 @@ TEST(AlignDelays, AreWrittenAndReadBackByCameraId) {
 
 TEST(AlignDelays, ADamagedFileIsNamedWithTheCamera) {
   const test::SmallBench bench(test::small_rig(1, 3));
-  const auto file = std::filesystem::path(testing::TempDir()) / "align_delays_damaged.json";
+  const test::TempFolder folder;
+  const auto file = folder / "align_delays_damaged.json";
   for (const char* text :
        {"", "[]", "{", "{\"virtual-01\": 3}", "{\"virtual-01\": {\"mean_s\": -1, \"sigma_s\": 1}}",
         "{\"virtual-01\": {\"mean_s\": \"soon\"}}"}) {

@@ -8,6 +8,7 @@
 #include <gtest/gtest.h>
 
 #include "rig/doctor/words.h"
+#include "tests/support/temp_folder.h"
 
 namespace emberlock::rig::doctor {
 namespace {
@@ -170,14 +171,12 @@ TEST(Doctor, WhatCamerasSendIsCountedFromTheConfiguration) {
 }
 
 TEST(Doctor, TheDisksProbeMeasuresAndLeavesNothingBehind) {
-  const auto folder = std::filesystem::temp_directory_path() / "emberlock_doctor_test";
-  std::filesystem::create_directories(folder);
+  const test::TempFolder folder(test::TempFolder::On::disk);
   const auto speed = write_speed(folder, 1 << 20, Seconds(2));
   ASSERT_TRUE(speed.ok()) << speed.error().message();
   EXPECT_GT(*speed, 0);
   EXPECT_TRUE(std::filesystem::is_empty(folder));
-  std::filesystem::remove(folder);
-  EXPECT_FALSE(write_speed(folder, 1 << 20, Seconds(2)).ok());
+  EXPECT_FALSE(write_speed(folder / "absent", 1 << 20, Seconds(2)).ok());
 }
 
 }  // namespace

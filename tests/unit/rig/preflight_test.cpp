@@ -6,6 +6,8 @@
 
 #include <gmock/gmock.h>
 
+#include "tests/support/temp_folder.h"
+
 namespace emberlock::rig {
 namespace {
 namespace fs = std::filesystem;
@@ -15,12 +17,6 @@ using ::testing::SizeIs;
 
 class Preflight : public ::testing::Test {
  protected:
-  Preflight() {
-    fs::remove_all(folder_);
-    fs::create_directories(folder_);
-  }
-  ~Preflight() override { fs::remove_all(folder_); }
-
   fs::path write(const std::string& name, const std::string& text, unsigned mode = 0600) const {
     std::ofstream(folder_ / name) << text;
     fs::permissions(folder_ / name, static_cast<fs::perms>(mode));
@@ -31,7 +27,7 @@ class Preflight : public ::testing::Test {
     return check_config(write("lab.toml", text + "\n[recording]\nfolder = \"sessions\"\n"));
   }
 
-  const fs::path folder_ = fs::temp_directory_path() / ("emberlock_preflight_" + std::to_string(::getpid()));
+  const test::TempFolder folder_;
 };
 
 constexpr const char* kServer = "[server]\nsocket = \"here.sock\"\n";

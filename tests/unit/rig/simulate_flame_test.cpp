@@ -18,17 +18,13 @@
 #include "recon/temperature/emitter.h"
 #include "recon/temperature/self_absorption.h"
 #include "session/reader.h"
+#include "tests/support/temp_folder.h"
 
 namespace emberlock::rig {
 namespace {
 
 class SimulateFlameTest : public testing::Test {
  protected:
-  SimulateFlameTest() {
-    std::filesystem::remove_all(folder_);
-    std::filesystem::create_directories(folder_);
-  }
-  ~SimulateFlameTest() override { std::filesystem::remove_all(folder_); }
   static SimulateOptions small() {
     SimulateOptions o;
     o.frames = 2;
@@ -85,7 +81,7 @@ class SimulateFlameTest : public testing::Test {
       most = std::max(most, *std::max_element(view.image->rgb.begin(), view.image->rgb.end()));
     return most;
   }
-  std::filesystem::path folder_ = std::filesystem::path(testing::TempDir()) / "simulate-flame";
+  const test::TempFolder folder_;
 };
 
 TEST_F(SimulateFlameTest, LeavesASessionAndItsTruth) {
@@ -112,7 +108,8 @@ TEST_F(SimulateFlameTest, LeavesASessionAndItsTruth) {
   EXPECT_EQ(velocity->size(), 3 * temperature->size());
 }
 
-TEST_F(SimulateFlameTest, PicturesShowTheTruth) {
+using SimulateFlameSlow = SimulateFlameTest;
+TEST_F(SimulateFlameSlow, PicturesShowTheTruth) {
   SimulateOptions o = small();
   o.preset = recon::FlamePreset::torch;
   o.read_noise = 0;
@@ -146,7 +143,7 @@ TEST_F(SimulateFlameTest, SmokeIsLitByTheSun) {
   EXPECT_GT(most, 100);
 }
 
-TEST_F(SimulateFlameTest, AnAbsoluteResponseTellsTheLevels) {
+TEST_F(SimulateFlameSlow, AnAbsoluteResponseTellsTheLevels) {
   SimulateOptions o = small();
   o.read_noise = 0;
   o.response = response(500);
@@ -175,15 +172,13 @@ TEST_F(SimulateFlameTest, AnAbsoluteResponseTellsTheLevels) {
   EXPECT_NEAR(volume.emission[3 * p + 1], expected, 1e-3 * expected);
 }
 
-TEST_F(SimulateFlameTest, TwiceTheExposureIsTwiceTheLight) {
+TEST_F(SimulateFlameSlow, TwiceTheExposureIsTwiceTheLight) {
   SimulateOptions o = small();
   o.frames = 1;
   o.response = response(1e-6);
   std::vector<float> most;
   for (const double ms : {0.5, 1.0}) {
     o.exposure = milliseconds(ms);
-    std::filesystem::remove_all(folder_);
-    std::filesystem::create_directories(folder_);
     ASSERT_TRUE(simulate_flame(o, folder_).ok());
     const recon::Volume volume = truth(0);
     most.push_back(*std::max_element(volume.emission.begin(), volume.emission.end()));
@@ -191,7 +186,7 @@ TEST_F(SimulateFlameTest, TwiceTheExposureIsTwiceTheLight) {
   EXPECT_NEAR(most[1] / most[0], 2, 1e-4);
 }
 
-TEST_F(SimulateFlameTest, LateCamerasFilmLaterAndSaySo) {
+TEST_F(SimulateFlameSlow, LateCamerasFilmLaterAndSaySo) {
   SimulateOptions o = small();
   o.preset = recon::FlamePreset::torch;
   o.read_noise = 0;
@@ -275,7 +270,7 @@ TEST_F(SimulateFlameTest, SaysHowManyCellsAreFinerThanThePictures) {
 }
 
 /// So that what is finer than a flame's slow settling costs no time in it.
-TEST_F(SimulateFlameTest, FineGridsBeginOnCoarseOnes) {
+TEST_F(SimulateFlameSlow, FineGridsBeginOnCoarseOnes) {
   SimulateOptions o = small();
   o.preset = recon::FlamePreset::two_plumes;
   o.frames = 1;
@@ -294,7 +289,7 @@ TEST_F(SimulateFlameTest, FineGridsBeginOnCoarseOnes) {
 
 /// A thin bright sheet, which coarse grids can't show, looks as if it took light. With 56 / m of extinction
 /// instead of 1 its emission was off by 68 %.
-TEST_F(SimulateFlameTest, ACandleIsNotTakenForAThickMedium) {
+TEST_F(SimulateFlameSlow, ACandleIsNotTakenForAThickMedium) {
   SimulateOptions o = small();
   o.frames = 1;
   o.cameras = 10;

@@ -79,7 +79,8 @@ TEST_F(SessionCertificateTest, EqualSessionsHaveEqualOnes) {
   EXPECT_EQ(bytes_of(certificate_path(session_)), first);
 }
 
-TEST_F(SessionCertificateTest, OneChangedByteInAnyFileIsFound) {
+using SessionCertificateSlow = SessionCertificateTest;
+TEST_F(SessionCertificateSlow, OneChangedByteInAnyFileIsFound) {
   for (const SigningKey* key : {static_cast<const SigningKey*>(nullptr), &std::as_const(key_)}) {
     certify(key);
     std::vector<fs::path> all = files();

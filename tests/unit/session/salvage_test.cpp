@@ -136,7 +136,8 @@ TEST_F(SalvageCutShort, ByTheObserverAtAnyQuestionItIsTakenUpWithTheSameOutcome)
   }
 }
 
-TEST_F(SalvageCutShort, ByAKillAtAnyQuestionItIsTakenUpWithTheSameOutcome) {
+using SalvageCutShortSlow = SalvageCutShort;
+TEST_F(SalvageCutShortSlow, ByAKillAtAnyQuestionItIsTakenUpWithTheSameOutcome) {
   for (int after = 0; after < questions_; after += 3) {
     const auto folder = again();
     const pid_t child = ::fork();
@@ -197,15 +198,13 @@ TEST(Salvage, APowerCutOnTheChangeOfSegmentsLeavesNoFrameThatCantBeRead) {
   EXPECT_TRUE(check->whole()) << check->to_do;
 }
 
-class CheckedSegment : public testing::TestWithParam<Encoding> {};
-
 /// Wherever a byte flips. The other way round a few bytes matter to checksums alone: those are decoded then.
-TEST_P(CheckedSegment, WhatIsCalledWholeCanBeRead) {
+void expect_that_what_is_called_whole_can_be_read(Encoding encoding) {
   const TempFolder temp;
   for (const ImageLayout& layout : {kSalvagedLayout, ImageLayout{{8, 6}, PixelFormat::gray16, 12},
                                     ImageLayout{{40, 24}, PixelFormat::rgb8, 8}}) {
     const auto folder = temp / (std::string(name(layout.format)) + std::to_string(layout.size.width));
-    test::record(folder, layout, 5, small_disk_options(GetParam()));
+    test::record(folder, layout, 5, small_disk_options(encoding));
     const auto index = read_index(folder, "cam0");
     ASSERT_TRUE(index.ok());
     const auto path = find_segment(folder, "cam0", 0);
@@ -229,6 +228,16 @@ TEST_P(CheckedSegment, WhatIsCalledWholeCanBeRead) {
     EXPECT_LT(doubted, bad / 4) << name(layout.format);
   }
 }
+
+TEST(CheckedSegment, OfRawFramesCanBeRead) {
+  expect_that_what_is_called_whole_can_be_read(Encoding::raw_nut);
+}
+
+class CheckedSegmentSlow : public testing::TestWithParam<Encoding> {};
+TEST_P(CheckedSegmentSlow, WhatIsCalledWholeCanBeRead) {
+  expect_that_what_is_called_whole_can_be_read(GetParam());
+}
+INSTANTIATE_TEST_SUITE_P(Salvage, CheckedSegmentSlow, testing::Values(Encoding::ffv1, Encoding::huffman_nut));
 
 /// Where each frame's coded bytes lie in a segment: their offset and their number.
 std::vector<std::pair<std::size_t, std::size_t>> coded_frames(const std::filesystem::path& segment) {
@@ -267,9 +276,6 @@ TEST(Salvage, AFrameOfZerosIsntWhole) {
   }
   EXPECT_GT(multiples_of_eight, 0);
 }
-
-INSTANTIATE_TEST_SUITE_P(Salvage, CheckedSegment,
-                         testing::Values(Encoding::ffv1, Encoding::raw_nut, Encoding::huffman_nut));
 
 }  // namespace
 }  // namespace emberlock::session

@@ -9,42 +9,16 @@
 #include <string>
 #include <vector>
 
-#include <unistd.h>
-
 #include "base/file.h"
 #include "base/frame.h"
 #include "base/random.h"
 #include "session/layout.h"
 #include "session/reader.h"
 #include "session/writer.h"
+#include "tests/support/temp_folder.h"
 
-// What tests of recordings share: a folder that goes away, frames made from a seed, a session of them.
+// What tests of recordings share: frames made from a seed, and a session of them.
 namespace emberlock::test {
-
-class TempFolder {
- public:
-  /// In memory where there is such a folder: recordings flush each segment to disk, and tests make many.
-  enum class On { memory, disk };
-  explicit TempFolder(On on = On::memory) {
-    const std::filesystem::path memory = "/dev/shm";
-    const bool usable = on == On::memory && ::access(memory.c_str(), W_OK) == 0;
-    std::string name =
-        ((usable ? memory : std::filesystem::temp_directory_path()) / "emberlock-test-XXXXXX").string();
-    if (::mkdtemp(name.data()) == nullptr) throw std::runtime_error("no temporary folder");
-    path_ = name;
-  }
-  TempFolder(const TempFolder&) = delete;
-  TempFolder& operator=(const TempFolder&) = delete;
-  ~TempFolder() {
-    std::error_code ec;
-    std::filesystem::remove_all(path_, ec);
-  }
-  [[nodiscard]] const std::filesystem::path& path() const { return path_; }
-  std::filesystem::path operator/(const std::string& name) const { return path_ / name; }
-
- private:
-  std::filesystem::path path_;
-};
 
 /// Noise over the whole range of the bit depth, the extremes included: the hardest content for a lossless
 /// codec.

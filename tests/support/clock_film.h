@@ -106,6 +106,13 @@ inline std::vector<smear::FrameReading> film(const ClockFilm& f) {
   return readings;
 }
 
+/// The readings of a film without its frames' numbers.
+inline std::vector<smear::SmearReading> readings_of(const ClockFilm& f) {
+  std::vector<smear::SmearReading> readings;
+  for (smear::FrameReading& frame : film(f)) readings.push_back(std::move(frame.reading));
+  return readings;
+}
+
 /// tau of the strobe's flashes, about one a frame, on their line at time t.
 inline double true_tau(const ClockFilm& f, double t) {
   const double period = f.timing.frame_period.value();

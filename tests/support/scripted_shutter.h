@@ -66,6 +66,8 @@ struct ScriptedShutter {
   int pictures_ = 0;
 };
 
+inline const smear::PeriodOffset kStill{PartsPerMillion(0), PartsPerMillion(1)};
+
 /// What a sensor told in a round.
 struct ToldRound {
   smear::Phase phase;  ///< the last one
@@ -97,6 +99,14 @@ class SensorRounds {
     }
     return told;
   }
+  /// Films a round whose phase is right within its error, which is less than `sigma`.
+  ToldRound expect_true(const smear::PeriodOffset& own, Seconds sigma = microseconds(40)) {
+    const ToldRound told = film(own);
+    EXPECT_EQ(told.phase.state, smear::PhaseState::known) << told.phase.reason;
+    EXPECT_LT(off(told), 4 * told.phase.sigma);
+    EXPECT_LT(told.phase.sigma, sigma);
+    return told;
+  }
   /// By how much the phase that was told is off.
   [[nodiscard]] Seconds off(const ToldRound& told) const {
     return abs(wrap_symmetric(told.phase.tau - shutter_.tau(told.at, kDelay), shutter_.period));
@@ -123,8 +133,6 @@ class SensorRounds {
   smear::PhaseSensor& sensor_;
   TimePoint now_;
 };
-
-inline const smear::PeriodOffset kStill{PartsPerMillion(0), PartsPerMillion(1)};
 
 /// What is said of an exposure that is too short, and of one that is too long; then it is as it was.
 inline void expect_exposures_advised(ScriptedShutter& shutter, SensorRounds& rounds,

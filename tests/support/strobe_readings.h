@@ -3,6 +3,7 @@
 
 #include <cmath>
 #include <cstdint>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -23,15 +24,22 @@ struct ReadCamera {
   double lamp_error = 0.1;     ///< RMS, rows: of each frame's
   double dot_error = 0.05;     ///< the same of each dot
   double hidden = 12;          ///< rows about the lamp that its bloom covers
-  int frames = 240;
+  int frames = 240;            ///< in the file
+  std::set<int> lost{};        ///< which didn't get into it
   [[nodiscard]] double read_start(int frame) const { return start + frame * period; }
 };
 
-/// Flashes that may be skipped: flash j is given where given[j]; beyond its ends none is.
+/// Flashes that may be skipped: flash j is given where given[j], an empty pattern gives all.
 struct ReadStrobe {
   double rate = 24.2;    ///< 1/s
   double width = 20e-6;  ///< of a flash, seconds, centred on its instant
   std::vector<bool> given{};
+  bool repeats = false;  ///< the pattern, before and after; else no flash is given there
+  [[nodiscard]] bool gives(std::int64_t j) const {
+    const auto n = static_cast<std::int64_t>(given.size());
+    if (repeats && n > 0) j = (j % n + n) % n;
+    return n == 0 || (j >= 0 && j < n && given[static_cast<std::size_t>(j)]);
+  }
 };
 
 /// What the detector would say of each frame of a clip. A flash of `width` leaves its dot where the charge of
@@ -46,15 +54,13 @@ inline smear::ClipReading read_strobe(const ReadCamera& camera, const ReadStrobe
   clip.file = clip.name = "camera " + std::to_string(seed);
   clip.rows = camera.rows;
   clip.claimed_rate = Hertz(23.976);
-  for (int i = 0; i < camera.frames; ++i) {
+  for (int i = 0; static_cast<int>(clip.frames.size()) < camera.frames; ++i) {
     const double begin = camera.read_start(i);
     bool lit = false;
     std::vector<double> dots;
     const auto first = static_cast<std::int64_t>(std::floor((begin - 2 * camera.period) / flashes));
     for (std::int64_t j = first; static_cast<double>(j) * flashes < begin + camera.period; ++j) {
-      if (j < 0 || j >= static_cast<std::int64_t>(strobe.given.size()) ||
-          !strobe.given[static_cast<std::size_t>(j)])
-        continue;
+      if (!strobe.gives(j)) continue;
       const double after = static_cast<double>(j) * flashes - begin;
       lit = lit || (after < 0 && after >= -camera.period);
       for (const int earlier : {0, 1}) {
@@ -83,7 +89,7 @@ inline smear::ClipReading read_strobe(const ReadCamera& camera, const ReadStrobe
                                          : smear::SmearState::comb;
       if (dots.empty()) reading.reason = "its column is clean";
     }
-    clip.frames.push_back(reading);
+    if (!camera.lost.contains(i)) clip.frames.push_back(reading);
   }
   return clip;
 }

@@ -8,13 +8,11 @@
 #include <string>
 #include <utility>
 
-#include <fmt/format.h>
-#include <unistd.h>
-
 #include "apply/stylize.h"
 #include "base/clock.h"
 #include "recon/export/picture.h"
 #include "recon/synthetic/flame.h"
+#include "tests/support/temp_folder.h"
 
 namespace emberlock::test {
 
@@ -79,8 +77,8 @@ std::filesystem::path write_object(const std::filesystem::path& file, int edge, 
 
 /// A folder of a test's own.
 inline std::filesystem::path folder_for(const std::string& name) {
-  std::filesystem::path folder =
-      std::filesystem::temp_directory_path() / fmt::format("stylize_{}_{}", name, ::getpid());
+  static const TempFolder folders;
+  const std::filesystem::path folder = folders / name;
   std::filesystem::remove_all(folder);
   std::filesystem::create_directories(folder);
   return folder;

@@ -80,7 +80,7 @@ recon::CameraModel camera_of(const Geometry& g) {
   return camera;
 }
 
-TEST(MarkerTest, PosesReprojectWithinHalfAPixelOverAllGeometries) {
+TEST(MarkerSlow, PosesReprojectWithinHalfAPixelOverAllGeometries) {
   const Marker marker = usual_marker();
   const Plate plate(marker);
   const auto light = light_of_srgb();
@@ -112,7 +112,7 @@ TEST(MarkerTest, PosesReprojectWithinHalfAPixelOverAllGeometries) {
   EXPECT_LT(worst, 0.25);
 }
 
-TEST(MarkerTest, ABoardIsSeenWhereAPartOfItIsHidden) {
+TEST(MarkerSlow, ABoardIsSeenWhereAPartOfItIsHidden) {
   const Marker marker = parse_marker("charuco:5x4:30mm:22mm:4X4_50").value();
   const Plate plate(marker);
   const recon::CameraModel camera = before_plate(table_lens(600, kBarrel), {0.12, -0.1, 0.35});

@@ -175,7 +175,7 @@ TEST(PoseTrackTest, TheMotionTellsWhichOfTwoPosesItIs) {
 }
 
 /// Pictures, with the detector, noise and lens: each frame within half a pixel of the truth.
-TEST(PoseTrackTest, AFilmOfAMarkerReprojectsWithinHalfAPixel) {
+TEST(PoseTrackSlow, AFilmOfAMarkerReprojectsWithinHalfAPixel) {
   const Marker marker = usual_marker();
   const test::Plate plate(marker);
   const recon::Intrinsics small{{320, 240}, 320, 320, 160, 120, {-0.2, 0.05, 0, 0, 0}};

@@ -4,7 +4,8 @@
 #include <fstream>
 
 #include <gmock/gmock.h>
-#include <unistd.h>
+
+#include "tests/support/temp_folder.h"
 
 namespace emberlock {
 namespace {
@@ -13,13 +14,9 @@ using testing::HasSubstr;
 
 class FileTest : public testing::Test {
  protected:
-  void SetUp() override {
-    root_ = fs::temp_directory_path() / ("emberlock_file_test." + std::to_string(::getpid()));
-    fs::create_directories(root_);
-  }
-  void TearDown() override { fs::remove_all(root_); }
   static void put(const fs::path& p, std::string_view text) { std::ofstream(p) << text; }
-  fs::path root_;
+  test::TempFolder folder_;
+  const fs::path& root_ = folder_.path();
 };
 
 TEST_F(FileTest, WhatWasWrittenIsRead) {

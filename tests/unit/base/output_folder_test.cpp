@@ -13,6 +13,7 @@
 #include <unistd.h>
 
 #include "base/file.h"
+#include "tests/support/temp_folder.h"
 
 namespace emberlock {
 namespace {
@@ -61,15 +62,6 @@ const Files kSecond{{"report.json", "second"}, {"views/0.png", "c"}};
 
 class OutputFolderTest : public testing::Test {
  protected:
-  void SetUp() override {
-    // In memory, as there is much to flush.
-    const fs::path memory = "/dev/shm";
-    root_ = (::access(memory.c_str(), W_OK) == 0 ? memory : fs::temp_directory_path()) /
-            ("emberlock_output_test." + std::to_string(::getpid()));
-    fs::create_directories(root_);
-    out_ = root_ / "out";
-  }
-  void TearDown() override { fs::remove_all(root_); }
   [[nodiscard]] OutputRequest request() const { return {out_, kVerb}; }
   void make_first() const {
     const Status made = make(request(), kFirst);
@@ -89,8 +81,9 @@ class OutputFolderTest : public testing::Test {
     }
     EXPECT_EQ(files_in(root_), before);
   }
-  fs::path root_;
-  fs::path out_;
+  test::TempFolder folder_;  // in memory, as there is much to flush
+  const fs::path& root_ = folder_.path();
+  const fs::path out_ = root_ / "out";
 };
 
 TEST_F(OutputFolderTest, AppearsWhenItIsCommittedAndNotBefore) {
@@ -324,7 +317,9 @@ bool killed_at_call(int last, const Act& act) {
   return true;
 }
 
-TEST_F(OutputFolderTest, KilledAtAnySystemCallOneResultStandsWholeAndNothingForeignIsLost) {
+using OutputFolderSlow = OutputFolderTest;
+
+TEST_F(OutputFolderSlow, KilledAtAnySystemCallOneResultStandsWholeAndNothingForeignIsLost) {
   const Files foreign{{"notes.txt", "mine"}, {"views/best.txt", "mine too"}, {"empty/", ""}};
   Files first = kFirst;
   first.insert(foreign.begin(), foreign.end());

@@ -16,6 +16,8 @@
 
 #include "base/file.h"
 #include "base/output_folder.h"
+#include "tests/support/temp_folder.h"
+#include "tests/support/wait.h"
 
 namespace emberlock {
 namespace {
@@ -28,12 +30,6 @@ void put(const fs::path& path, std::string_view text) {
 
 class OutputLeftovers : public testing::Test {
  protected:
-  void SetUp() override {
-    root_ = fs::temp_directory_path() / ("emberlock_leftovers_test." + std::to_string(::getpid()));
-    fs::create_directories(root_);
-    out_ = root_ / "out";
-  }
-  void TearDown() override { fs::remove_all(root_); }
   [[nodiscard]] OutputRequest request() const { return {out_, {"render"}}; }
   [[nodiscard]] Status make(std::string_view text) const {
     EMBERLOCK_ASSIGN_OR_RETURN(OutputFolder folder, OutputFolder::create(request()));
@@ -44,8 +40,9 @@ class OutputLeftovers : public testing::Test {
     const auto text = read_file(folder / "report.json");
     return text ? *text : text.error().message();
   }
-  fs::path root_;
-  fs::path out_;
+  test::TempFolder folder_;
+  const fs::path& root_ = folder_.path();
+  const fs::path out_ = root_ / "out";
 };
 
 TEST_F(OutputLeftovers, KilledBetweenBothRenamesTheEarlierResultComesBackThoughItsNameIsAnEmptyFolders) {
@@ -71,20 +68,21 @@ TEST_F(OutputLeftovers, WhatHasTheNameThatAnEarlierResultNeedsIsSaidBeforeTheWor
   EXPECT_TRUE(fs::exists(earlier_of(out_) / "notes.txt"));
 }
 
-/// Access mode of this process's file descriptor on `path`; nothing where it has none.
-std::optional<int> open_mode(const fs::path& path) {
+/// Access modes of this process's file descriptors on `path`.
+std::vector<int> open_modes(const fs::path& path) {
+  std::vector<int> modes;
   for (const auto& fd : fs::directory_iterator("/proc/self/fd")) {
     std::error_code ec;
-    if (fs::read_symlink(fd.path(), ec) != path || ec) continue;
-    return ::fcntl(std::stoi(fd.path().filename()), F_GETFL) & O_ACCMODE;
+    if (fs::read_symlink(fd.path(), ec) == path && !ec)
+      modes.push_back(::fcntl(std::stoi(fd.path().filename()), F_GETFL) & O_ACCMODE);
   }
-  return std::nullopt;
+  return modes;
 }
 
 TEST_F(OutputLeftovers, TheListIsLockedByAFileOpenForWritingWhichNfsAsksFor) {
   auto folder = OutputFolder::create(request());
   ASSERT_TRUE(folder.ok());
-  EXPECT_EQ(open_mode(fs::canonical(folder->path()) / kResultList), O_RDWR);
+  EXPECT_THAT(open_modes(fs::canonical(folder->path()) / kResultList), testing::ElementsAre(O_RDWR));
   EXPECT_FALSE(lock_list(folder->path())) << "somebody fills it";
 }
 
@@ -98,7 +96,7 @@ TEST_F(OutputLeftovers, WhoFindsTheFolderLockedWaitsAndSaysSoInTheEnd) {
 
   std::atomic<bool> released = false;
   std::thread other([&] {
-    std::this_thread::sleep_for(std::chrono::milliseconds(200));
+    EXPECT_TRUE(test::wait_until([&] { return open_modes(fs::canonical(root_)).size() == 2; }));
     released = true;
     const UniqueFd let_go = std::move(held).value();
   });

@@ -9,11 +9,11 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <unistd.h>
 
 #include "base/hex.h"
 #include "base/sha256.h"
 #include "tests/support/signing_key.h"
+#include "tests/support/temp_folder.h"
 
 namespace emberlock {
 namespace {
@@ -23,13 +23,11 @@ using testing::HasSubstr;
 
 class InAFolder : public testing::Test {
  protected:
-  void SetUp() override { fs::create_directories(folder_); }
-  void TearDown() override { fs::remove_all(folder_); }
   void put(const std::string& name, const std::string& bytes) const {
     std::ofstream(folder_ / name, std::ios::binary) << bytes;
   }
-  const fs::path folder_ =
-      fs::temp_directory_path() / ("emberlock_signature_test." + std::to_string(::getpid()));
+  test::TempFolder temp_;
+  const fs::path& folder_ = temp_.path();
 };
 class FileHashTest : public InAFolder {};
 class SignatureTest : public InAFolder {};

@@ -32,7 +32,7 @@ TEST(PixelNoise, FallsWithTheRootOfLight) {
   EXPECT_NEAR(pixel_noise(hot, milliseconds(4)), r.noise / std::sqrt(brighter), 1e-12);
 }
 
-TEST(Design, MeetsItsTargetWithTheFewestCamerasThatDo) {
+TEST(DesignSlow, MeetsItsTargetWithTheFewestCamerasThatDo) {
   const Design d = design(kLaw, request(9));
   ASSERT_TRUE(d.reached);
   EXPECT_LE(d.chosen.error(), 9);
@@ -43,7 +43,7 @@ TEST(Design, MeetsItsTargetWithTheFewestCamerasThatDo) {
   }
 }
 
-TEST(Design, MoreCamerasAndFinerPicturesAreNeverPredictedWorse) {
+TEST(DesignSlow, MoreCamerasAndFinerPicturesAreNeverPredictedWorse) {
   for (const ImageSize size : design_sizes())
     for (int n = 3; n < 32; ++n)
       EXPECT_LE(designed(kLaw, request(5), n + 1, size).error(),
@@ -55,13 +55,13 @@ TEST(Design, MoreCamerasAndFinerPicturesAreNeverPredictedWorse) {
               designed(kLaw, request(5), 8, sizes[i - 1]).error());
 }
 
-TEST(Design, AnImpossibleTargetGivesTheMostAccurate) {
+TEST(DesignSlow, AnImpossibleTargetGivesTheMostAccurate) {
   const Design d = design(kLaw, request(0.5));
   EXPECT_FALSE(d.reached);
   for (const DesignedRig& rig : d.curve) EXPECT_GE(rig.error(), d.chosen.error());
 }
 
-TEST(Design, StepsLowerTheErrorByWhatTheySayTheLargestFirst) {
+TEST(DesignSlow, StepsLowerTheErrorByWhatTheySayTheLargestFirst) {
   const Design d = design(kLaw, request(9));
   ASSERT_FALSE(d.steps.empty());
   double before = INFINITY;

@@ -103,7 +103,7 @@ TEST(ErrorLawFit, FindsTheLawThatMadeTheErrors) {
   EXPECT_NEAR(total(predict(*law, other)) / total(predict(kTrue, other)), 1, 0.01);
 }
 
-TEST(ErrorLawFit, GivesNoNegativeStrengths) {
+TEST(ErrorLawFitSlow, GivesNoNegativeStrengths) {
   std::vector<MeasuredRig> rigs = measured_rigs();
   for (std::size_t i = 0; i < rigs.size(); ++i) rigs[i].error *= 1 + 0.3 * random_normal(3, 0, i) / 3;
   const Result<ErrorLaw> law = fit_error_law(rigs);

@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <filesystem>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -11,6 +10,7 @@
 #include "base/file.h"
 #include "cli/outputs.h"
 #include "report/sync_tradeoff_report.h"
+#include "tests/support/temp_folder.h"
 
 namespace emberlock::evaluate {
 namespace {
@@ -87,15 +87,14 @@ TEST_F(SyncTradeoffTest, APointsCommandMeasuresItAgain) {
 }
 
 TEST_F(SyncTradeoffTest, FilesHoldEveryPoint) {
-  const auto folder = std::filesystem::path(testing::TempDir()) / "sync_tradeoff";
-  std::filesystem::remove_all(folder);
+  const test::TempFolder temp;
+  const auto folder = temp / "out";
   ASSERT_TRUE(report::write_sync_tradeoff(*tradeoff_, {folder, cli::kTradeoffSync, {}}).ok());
   const std::string csv = read_file(folder / "points.csv").value();
   EXPECT_EQ(std::count(csv.begin(), csv.end(), '\n'), 7);
   EXPECT_THAT(read_file(folder / "diagram.svg").value(), HasSubstr("xmlns=\"http://www.w3.org/2000/svg\""));
   EXPECT_THAT(read_file(folder / "index.html").value(), HasSubstr("recommended"));
   EXPECT_EQ(report::sync_tradeoff_json(*tradeoff_)["points"].size(), 6u);
-  std::filesystem::remove_all(folder);
 }
 
 TEST(SyncTradeoffOptionsTest, OutOfRangeNamesTheOptionAndTheRange) {

@@ -25,7 +25,7 @@ TEST(TwinRigs, ThoseThatCheckAreNoneOfThoseThatFit) {
           << check.name;
 }
 
-TEST(Twin, MoreCamerasAreMeasuredBetterAndTwiceTheSame) {
+TEST(TwinSlow, MoreCamerasAreMeasuredBetterAndTwiceTheSame) {
   Twin twin(1);
   const SteadyClock clock;
   const auto error = [&](int cameras) {

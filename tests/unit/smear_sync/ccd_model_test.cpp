@@ -3,7 +3,8 @@
 
 #include <cmath>
 #include <limits>
-#include <numeric>
+#include <optional>
+#include <utility>
 
 #include <gtest/gtest.h>
 
@@ -20,48 +21,54 @@ CcdTiming timing(ReadDirection direction, int shifts = 100) {
 }
 Flash at_row_time(double k, double width = 0.25) { return {Seconds(k / 1024), Seconds(width / 1024)}; }
 
-void expect_single(const std::vector<SmearDeposit>& deposits, int image, int row) {
-  ASSERT_EQ(deposits.size(), 1U);
-  EXPECT_EQ(deposits[0].image, image);
-  EXPECT_EQ(deposits[0].row, row);
+/// A flash of a quarter row time, centred `at` row times after the read phase began, over a lamp in row 30.
+struct ShortFlash {
+  const char* name;
+  ReadDirection direction;
+  int shifts;
+  double at;
+  std::optional<std::pair<int, int>> seen;  ///< image and row
+  SweepOut sweep_out = SweepOut::none;
+  double width = 0.25;
+};
+
+class ShortFlashes : public testing::TestWithParam<ShortFlash> {};
+
+TEST_P(ShortFlashes, ShowInOneRowOrNone) {
+  const ShortFlash& f = GetParam();
+  const auto deposits =
+      smear_deposits(timing(f.direction, f.shifts), 30, at_row_time(f.at, f.width), f.sweep_out);
+  ASSERT_EQ(deposits.size(), f.seen ? 1U : 0U);
+  if (!f.seen) return;
+  EXPECT_EQ(std::pair(deposits[0].image, deposits[0].row), *f.seen);
   EXPECT_DOUBLE_EQ(deposits[0].fraction, 1);
 }
 
-TEST(CcdModel, TopFirstMovesTheDotDownInTheSameImage) {
-  expect_single(smear_deposits(timing(ReadDirection::top_first), 30, at_row_time(20.5)), 0, 50);
-}
-
-TEST(CcdModel, BottomFirstMovesTheDotUpInTheSameImage) {
-  expect_single(smear_deposits(timing(ReadDirection::bottom_first), 30, at_row_time(20.5)), 0, 10);
-}
-
-TEST(CcdModel, AWrappedDotIsSeenInTheNextImageOnTheOtherSide) {
-  expect_single(smear_deposits(timing(ReadDirection::top_first), 30, at_row_time(80.5)), 1, 10);
-  expect_single(smear_deposits(timing(ReadDirection::bottom_first), 30, at_row_time(80.5)), 1, 50);
-}
-
-TEST(CcdModel, DummyLinesHideTheDotAndDelayTheWrap) {
-  const CcdTiming t = timing(ReadDirection::top_first, 120);
-  expect_single(smear_deposits(t, 30, at_row_time(69.5)), 0, 99);
-  EXPECT_TRUE(smear_deposits(t, 30, at_row_time(70.5)).empty());
-  EXPECT_TRUE(smear_deposits(t, 30, at_row_time(89.5)).empty());
-  expect_single(smear_deposits(t, 30, at_row_time(90.5)), 1, 0);
-}
-
-TEST(CcdModel, DuringTheRestTheChargeStaysOnTheLampOfTheNextImage) {
-  expect_single(smear_deposits(timing(ReadDirection::top_first), 30, at_row_time(115)), 1, 30);
-}
-
-TEST(CcdModel, BeforeTheReadPhaseTheFlashBelongsToTheRestOfTheFrameBefore) {
-  expect_single(smear_deposits(timing(ReadDirection::top_first), 30, at_row_time(-1.5)), 0, 30);
-}
-
-TEST(CcdModel, SweepOutLeavesOnlyTheSideReadAfterTheLamp) {
-  const CcdTiming t = timing(ReadDirection::top_first);
-  EXPECT_TRUE(smear_deposits(t, 30, at_row_time(80.5), SweepOut::before_transfer).empty());
-  EXPECT_TRUE(smear_deposits(t, 30, at_row_time(115), SweepOut::before_transfer).empty());
-  expect_single(smear_deposits(t, 30, at_row_time(20.5), SweepOut::before_transfer), 0, 50);
-}
+constexpr auto kTopFirst = ReadDirection::top_first;
+constexpr auto kSwept = SweepOut::before_transfer;
+using At = std::pair<int, int>;
+INSTANTIATE_TEST_SUITE_P(
+    CcdModel, ShortFlashes,
+    testing::Values(
+        ShortFlash{"TopFirstMovesTheDotDownInTheSameImage", kTopFirst, 100, 20.5, At{0, 50}},
+        ShortFlash{"BottomFirstMovesTheDotUpInTheSameImage", ReadDirection::bottom_first, 100, 20.5,
+                   At{0, 10}},
+        ShortFlash{"AWrappedDotIsSeenInTheNextImageAboveTheLamp", kTopFirst, 100, 80.5, At{1, 10}},
+        ShortFlash{"AWrappedDotIsSeenInTheNextImageBelowTheLamp", ReadDirection::bottom_first, 100, 80.5,
+                   At{1, 50}},
+        ShortFlash{"TheLastRowShowsBeforeTheDummyLines", kTopFirst, 120, 69.5, At{0, 99}},
+        ShortFlash{"TheFirstDummyLineHidesTheDot", kTopFirst, 120, 70.5, {}},
+        ShortFlash{"TheLastDummyLineHidesTheDot", kTopFirst, 120, 89.5, {}},
+        ShortFlash{"DummyLinesDelayTheWrap", kTopFirst, 120, 90.5, At{1, 0}},
+        ShortFlash{"DuringTheRestTheChargeStaysOnTheLampOfTheNextImage", kTopFirst, 100, 115, At{1, 30}},
+        ShortFlash{"BeforeTheReadPhaseTheFlashBelongsToTheRestOfTheFrameBefore", kTopFirst, 100, -1.5,
+                   At{0, 30}},
+        ShortFlash{"SweepOutTakesTheWrappedDot", kTopFirst, 100, 80.5, {}, kSwept},
+        ShortFlash{"SweepOutTakesTheRest", kTopFirst, 100, 115, {}, kSwept},
+        ShortFlash{"SweepOutLeavesTheSideReadAfterTheLamp", kTopFirst, 100, 20.5, At{0, 50}, kSwept},
+        ShortFlash{"AFlashExactlyAtARowBorderCountsForTheRowThatBegins", kTopFirst, 100, 21, At{0, 51},
+                   SweepOut::none, 0}),
+    [](const auto& test) { return test.param.name; });
 
 TEST(CcdModel, AFlashAcrossTwoRowPeriodsSplitsByTime) {
   const auto deposits = smear_deposits(timing(ReadDirection::top_first), 30, at_row_time(21.1, 0.4));
@@ -70,10 +77,6 @@ TEST(CcdModel, AFlashAcrossTwoRowPeriodsSplitsByTime) {
   EXPECT_EQ(deposits[1].row, 51);
   EXPECT_NEAR(deposits[0].fraction, 0.25, 1e-12);
   EXPECT_NEAR(deposits[1].fraction, 0.75, 1e-12);
-}
-
-TEST(CcdModel, AFlashExactlyAtARowBorderCountsForTheRowThatBegins) {
-  expect_single(smear_deposits(timing(ReadDirection::top_first), 30, at_row_time(21, 0)), 0, 51);
 }
 
 TEST(CcdModel, ConstantLightGivesEveryRowOneRowTime) {

@@ -44,7 +44,7 @@ std::optional<double> standardised_error(const ClipClock& clock, const test::Rea
   return wrap_symmetric(phase.tau.value() - tau, flashes) / phase.sigma.value();
 }
 
-TEST(ClipLine, ErrsAsItStatesWhereASlowBeatCarriesTheDotsPastTheLampOfACameraWhoseShiftsAreInDoubt) {
+TEST(ClipLineSlow, ErrsAsItStatesWhereASlowBeatCarriesTheDotsPastTheLampOfACameraWhoseShiftsAreInDoubt) {
   double squares = 0;
   int clips = 0;
   int in_doubt = 0;

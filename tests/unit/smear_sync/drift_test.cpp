@@ -117,7 +117,7 @@ TEST(Drift, ARowTimeThatIsOffMovesTheLineAsStated) {
 }
 
 // Charge moves in whole rows: a slow drift shows no step for a long time. The error must say so.
-TEST(Drift, StaircaseOfASlowDrift) {
+TEST(DriftSlow, StaircaseOfASlowDrift) {
   int outside = 0;
   for (int i = 0; i < 50; ++i) {
     auto samples = samples_of({.tau0 = 0.01 + 2e-6 * i, .ppm = 2, .seconds = 10, .noise_rows = 0});

@@ -15,39 +15,6 @@ using test::shift_register;
 
 constexpr Seconds kShort = microseconds(1);
 
-struct Case {
-  const char* situation;
-  CcdTiming timing;
-};
-
-std::vector<Case> timings() {
-  std::vector<Case> cases;
-  for (const auto direction : {ReadDirection::top_first, ReadDirection::bottom_first}) {
-    CcdTiming t{.rows = 72, .shifts = 72, .frame_period = Seconds(80.3e-4), .row_time = SecondsPerRow(1e-4)};
-    t.direction = direction;
-    cases.push_back({"as many shifts as rows", t});
-    t.shifts = 75;
-    cases.push_back({"dummy lines", t});
-    t.shifts = 80;
-    cases.push_back({"no rest", t});
-  }
-  return cases;
-}
-
-TEST(Phase, InvertsTheShiftRegisterForEveryRowPhaseAndLampRow) {
-  for (const auto& [situation, timing] : timings()) {
-    for (const int lamp : {3, 36, 68}) {
-      for (double tau = 0.00005; tau < timing.frame_period.value(); tau += 1e-4) {
-        const auto dot = shift_register(timing, lamp, Seconds(tau));
-        if (!dot) continue;
-        const Phase phase = phase_of(reading_of(*dot, lamp), timing, kShort);
-        ASSERT_EQ(phase.state, PhaseState::known);
-        EXPECT_NEAR(phase.tau.value(), tau, 1e-12) << situation << ", lamp at row " << lamp;
-      }
-    }
-  }
-}
-
 TEST(Phase, DotsOnOppositeSidesAreInStepWhenTheCircleSaysSo) {
   const CcdTiming timing{.shifts = 740};
   // The same phase, lamps at different rows: the second dot has left the image at the top and came in below.
@@ -60,15 +27,6 @@ TEST(Phase, DotsOnOppositeSidesAreInStepWhenTheCircleSaysSo) {
   const Phase pa = phase_of(reading_of(*a, 200), timing, kShort);
   const Phase pb = phase_of(reading_of(*b, 500), timing, kShort);
   EXPECT_NEAR(phase_error(pa, pb, timing.frame_period).value(), 0, 1e-12);
-}
-
-TEST(Phase, EqualDistancesOnOppositeSidesAreNotInStep) {
-  const CcdTiming timing;
-  const Phase above = phase_of(reading_of(300, 360), timing, kShort);
-  const Phase below = phase_of(reading_of(420, 360), timing, kShort);
-  const Rows error = phase_error(below, above, timing.frame_period) / timing.row_time;
-  // 60 rows after the start against 660: through the rest of 52.4 rows it is 172.4.
-  EXPECT_NEAR(error.value(), 60 - 660 + 1 / 23.976 / 54e-6, 1e-6);
 }
 
 TEST(Phase, WrapsModuloTheFramePeriodNotTheRows) {

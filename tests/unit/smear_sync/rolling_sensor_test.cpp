@@ -18,14 +18,7 @@ class RollingSensor : public testing::Test {
  protected:
   RollingSensor() { shutter.row_time = microseconds_per_row(250); }
 
-  /// A round whose phase is right.
-  ToldRound expect_true() {
-    const ToldRound told = rounds.film(kStill);
-    EXPECT_EQ(told.phase.state, PhaseState::known) << told.phase.reason;
-    EXPECT_LT(rounds.off(told), 4 * told.phase.sigma);
-    EXPECT_LT(told.phase.sigma, Rows(1) * shutter.row_time);
-    return told;
-  }
+  ToldRound expect_true() { return rounds.expect_true(kStill, Rows(1) * shutter.row_time); }
 
   ScriptedShutter shutter;
   std::unique_ptr<PhaseSensor> sensor =

@@ -3,12 +3,12 @@
 #include "smear_sync/verify/verify.h"
 
 #include <cmath>
-#include <set>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "base/random.h"
+#include "tests/support/strobe_readings.h"
 
 namespace emberlock::smear {
 namespace {
@@ -18,93 +18,39 @@ using testing::ElementsAre;
 using testing::HasSubstr;
 using testing::IsEmpty;
 
-/// A camera as built, on the strobe's own clock.
-struct Camera {
-  double start = 0;  // of the first read phase, seconds after flash 0
-  double ppm = 0;    // its period is that much longer
-  int shifts = 720;
-  int direction = +1;
-  double lamp = 300.3;
-  std::set<int> lost{};  // frames that didn't get into the file
-  int frames = 240;
-};
+using Camera = test::ReadCamera;
 
-constexpr double kClipRowTime = 54e-6;
-constexpr int kClipRows = 720;
-double period_of(const Camera& c) { return (1 + c.ppm * 1e-6) / 23.976; }
+constexpr SecondsPerRow kClipRow = microseconds_per_row(54);
 
-struct Strobe {
-  double rate = 24.2;
-  bool coded = true;
-  FrameCode code{.words = 8, .spacing = 60};  // a short cycle, quickly told
-};
+/// The period of a camera that is slower than its nominal rate.
+double period_of(double ppm) { return (1 + ppm * 1e-6) / 23.976; }
 
-/// What the detector would say of each frame.
-ClipReading film(const Camera& camera, const Strobe& strobe, const std::string& name,
-                 std::uint64_t seed = 1) {
-  const auto pattern = flash_pattern(strobe.code).value();
-  const double flashes = 1 / strobe.rate;
-  const auto given = [&](long j) {
-    const long n = strobe.code.flashes();
-    return !strobe.coded || pattern[static_cast<std::size_t>(((j % n) + n) % n)];
-  };
-  const double order = camera.direction > 0 ? camera.lamp : kClipRows - 1 - camera.lamp;
-  RandomStream random(seed, 5);
-  ClipReading clip;
-  clip.file = clip.name = name;
-  clip.rows = kClipRows;
-  clip.claimed_rate = Hertz(23.976);
-  for (int i = 0; static_cast<int>(clip.frames.size()) < camera.frames; ++i) {
-    const double begin = camera.start + i * period_of(camera);
-    bool lit = false;
-    std::vector<double> dots;
-    for (long j = std::lround(std::floor((begin - 2 * period_of(camera)) / flashes));
-         static_cast<double>(j) * flashes < begin + period_of(camera); ++j) {
-      if (!given(j)) continue;
-      const double after = static_cast<double>(j) * flashes - begin;
-      if (after < 0 && after >= -period_of(camera)) lit = true;
-      for (const int earlier : {0, 1}) {
-        const double k = std::floor((after + earlier * period_of(camera)) / kClipRowTime);
-        if (k < 0 || k >= camera.shifts) continue;
-        const double packet = order + k - earlier * camera.shifts;
-        const bool here = earlier == 0 ? packet <= kClipRows - 1 : packet >= 0;
-        const double row = camera.direction > 0 ? packet : kClipRows - 1 - packet;
-        if (here && std::abs(row - camera.lamp) > 12) dots.push_back(row);
-      }
-    }
-    SmearReading reading;
-    if (lit) {
-      reading.lamp = LampReading{
-          .x = 600, .y = Rows(camera.lamp + random.normal() * 0.1), .sigma = Rows(0.1), .radius = 4};
-      for (const double row : dots) {
-        DotReading dot;
-        dot.y = Rows(row + 0.05 * random.normal());
-        dot.sigma = Rows(0.05);
-        reading.dots.push_back(dot);
-      }
-      reading.state = dots.empty()       ? SmearState::no_dot
-                      : dots.size() == 1 ? SmearState::dot
-                                         : SmearState::comb;
-      if (dots.empty()) reading.reason = "its column is clean";
-    }
-    if (!camera.lost.contains(i)) clip.frames.push_back(reading);
-  }
-  return clip;
+const FrameCode kShortCycle{.words = 8, .spacing = 60};  // quickly told
+
+test::ReadStrobe coded(double rate = 24.2) {
+  return {.rate = rate, .width = 0, .given = flash_pattern(kShortCycle).value(), .repeats = true};
+}
+test::ReadStrobe uncoded(double rate = 24.2) { return {.rate = rate, .width = 0}; }
+
+ClipReading film(const Camera& camera, std::uint64_t seed = 1, const test::ReadStrobe& strobe = coded()) {
+  return test::read_strobe(camera, strobe, kClipRow, seed);
 }
 
-VerifyOptions options_of(const Strobe& strobe) {
+VerifyOptions options_of(const test::ReadStrobe& strobe = coded()) {
   VerifyOptions options;
   options.clip.flash_rate = Hertz(strobe.rate);
-  options.clip.row_time = SecondsPerRow(kClipRowTime);
-  options.clip.code = strobe.code;
+  options.clip.row_time = kClipRow;
+  options.clip.code = kShortCycle;
   return options;
 }
 
-VerifyResult verify(const std::vector<Camera>& cameras, const Strobe& strobe = {},
+VerifyResult verify(const std::vector<Camera>& cameras, const test::ReadStrobe& strobe = coded(),
                     std::optional<VerifyOptions> options = {}) {
   std::vector<ClipReading> clips;
-  for (const Camera& c : cameras)
-    clips.push_back(film(c, strobe, "camera " + std::to_string(clips.size()), clips.size() + 1));
+  for (const Camera& c : cameras) {
+    clips.push_back(film(c, clips.size() + 1, strobe));
+    clips.back().name = "camera " + std::to_string(clips.size() - 1);
+  }
   return verify_clips(clips, options.value_or(options_of(strobe))).value();
 }
 
@@ -115,24 +61,23 @@ struct Truth {
 };
 Truth truth(const Camera& reference, const Camera& camera) {
   const int middle = reference.frames / 2;
-  const double here = reference.start + middle * period_of(reference);
-  const int place = static_cast<int>(std::lround((here - camera.start) / period_of(camera)));
-  return {1e3 * (here - camera.start - place * period_of(camera)), place - middle};
+  const double here = reference.read_start(middle);
+  const int place = static_cast<int>(std::lround((here - camera.start) / camera.period));
+  return {1e3 * (here - camera.read_start(place)), place - middle};
 }
 
-TEST(Verify, RandomRigsComeOutWithinMicrosecondsAndToTheFrame) {
+TEST(VerifySlow, RandomRigsComeOutWithinMicrosecondsAndToTheFrame) {
   RandomStream random(20, 1);
   for (int rig = 0; rig < 15; ++rig) {
     std::vector<Camera> cameras(4);
     for (Camera& c : cameras) {
       c = {.start = random.uniform(0, 6),
-           .ppm = random.uniform(-25, 25),
+           .period = period_of(random.uniform(-25, 25)),
            .shifts = std::vector{720, 740, 772}[static_cast<std::size_t>(random.uniform(0, 3))],
            .direction = random.uniform() < 0.5 ? -1 : +1,
            .lamp = random.uniform(200, 520)};
     }
-    const Strobe strobe{.rate = random.uniform() < 0.5 ? 24.2 : 23.78};
-    const VerifyResult result = verify(cameras, strobe);
+    const VerifyResult result = verify(cameras, coded(random.uniform() < 0.5 ? 24.2 : 23.78));
     for (std::size_t i = 1; i < cameras.size(); ++i) {
       const CameraVerdict& c = result.cameras[i];
       ASSERT_TRUE(c.error && c.drift) << "rig " << rig << ": " << c.reason;
@@ -141,7 +86,8 @@ TEST(Verify, RandomRigsComeOutWithinMicrosecondsAndToTheFrame) {
           << "rig " << rig << " camera " << i << ": " << c.offset_reason;
       EXPECT_NEAR(wrap_symmetric(in_milliseconds(*c.error) - expected.error_ms, 1000 / 23.976), 0, 0.01)
           << "rig " << rig << " camera " << i;
-      EXPECT_NEAR(c.drift->value(), cameras[0].ppm - cameras[i].ppm, 3) << "rig " << rig << " camera " << i;
+      const double slower = (cameras[0].period - cameras[i].period) * 23.976e6;
+      EXPECT_NEAR(c.drift->value(), slower, 3) << "rig " << rig << " camera " << i;
       EXPECT_EQ(c.clock.timing.direction == ReadDirection::top_first, cameras[i].direction > 0);
       EXPECT_EQ(c.clock.timing.shifts, cameras[i].shifts);
     }
@@ -152,9 +98,9 @@ TEST(Verify, StatesFollowTheToleranceAndTheWorstPairTakesBothSides) {
   const Camera reference{.start = 1};
   const Camera earlier{.start = 1 - 0.004, .lamp = 400};
   const Camera later{.start = 1 + 0.005, .lamp = 250};
-  VerifyOptions options = options_of({});
+  VerifyOptions options = options_of();
   options.tolerance = {milliseconds(4.5)};
-  const VerifyResult result = verify({reference, earlier, later}, {}, options);
+  const VerifyResult result = verify({reference, earlier, later}, coded(), options);
   EXPECT_EQ(result.cameras[1].state, ClipState::in_sync);
   EXPECT_NEAR(in_milliseconds(*result.cameras[1].error), 4, 0.01);
   EXPECT_EQ(result.cameras[2].state, ClipState::out_of_tolerance);
@@ -163,15 +109,14 @@ TEST(Verify, StatesFollowTheToleranceAndTheWorstPairTakesBothSides) {
   EXPECT_THAT(result.to_do, ElementsAre(HasSubstr("Reset the shutter of camera 2")));
   EXPECT_THAT(result.to_do[0], ContainsRegex("(4\\.99|5\\.0[01]) ms \\(93 rows\\) earlier"));
   options.tolerance = {milliseconds(5.5)};
-  EXPECT_EQ(verify({reference, earlier, later}, {}, options).verdict, ClipsVerdict::in_sync);
+  EXPECT_EQ(verify({reference, earlier, later}, coded(), options).verdict, ClipsVerdict::in_sync);
   options.tolerance = {milliseconds(4.0)};
-  EXPECT_EQ(verify({reference, earlier}, {}, options).cameras[1].state, ClipState::ambiguous);
+  EXPECT_EQ(verify({reference, earlier}, coded(), options).cameras[1].state, ClipState::ambiguous);
 }
 
 TEST(Verify, ALostFrameIsCountedAndTheOffsetIsThatOfTheMiddle) {
   const Camera whole{.start = 1};
-  Camera holed{.start = 0.2, .ppm = 9, .direction = -1};
-  holed.lost = {40};
+  const Camera holed{.start = 0.2, .period = period_of(9), .direction = -1, .lost = {40}};
   const VerifyResult result = verify({whole, holed});
   const CameraVerdict& c = result.cameras[1];
   ASSERT_EQ(c.clock.numbers.drops.size(), 1U) << c.clock.numbers.reason;
@@ -183,7 +128,7 @@ TEST(Verify, ALostFrameIsCountedAndTheOffsetIsThatOfTheMiddle) {
 }
 
 TEST(Verify, WithoutACodeNoFramesArePairedAndABeatLeavesTheErrorOpen) {
-  const VerifyResult result = verify({{.start = 1}, {.start = 1.002}}, {.coded = false});
+  const VerifyResult result = verify({{.start = 1}, {.start = 1.002}}, uncoded());
   const CameraVerdict& c = result.cameras[1];
   EXPECT_FALSE(c.frame_offset);
   EXPECT_FALSE(c.offset_reason.empty());
@@ -193,10 +138,11 @@ TEST(Verify, WithoutACodeNoFramesArePairedAndABeatLeavesTheErrorOpen) {
 }
 
 TEST(Verify, WithoutACodeAStrobeInTuneStillTellsTheError) {
-  VerifyOptions options = options_of({.rate = 23.976});
+  VerifyOptions options = options_of(uncoded(23.976));
   options.clip.direction = ReadDirection::top_first;
-  const VerifyResult result = verify({{.start = 1 - 0.012, .ppm = 12}, {.start = 1.002 - 0.012, .ppm = -5}},
-                                     {.rate = 23.976, .coded = false}, options);
+  const VerifyResult result = verify(
+      {{.start = 1 - 0.012, .period = period_of(12)}, {.start = 1.002 - 0.012, .period = period_of(-5)}},
+      uncoded(23.976), options);
   const CameraVerdict& c = result.cameras[1];
   ASSERT_TRUE(c.error) << c.reason;
   EXPECT_NEAR(in_milliseconds(*c.error), -2, 0.2);
@@ -204,8 +150,7 @@ TEST(Verify, WithoutACodeAStrobeInTuneStillTellsTheError) {
 }
 
 TEST(Verify, AStrobeInTuneLeavesTheDirectionOpenAndSaysHowToTellIt) {
-  const VerifyResult result =
-      verify({{.start = 1 - 0.012}, {.start = 1.002 - 0.012}}, {.rate = 23.976, .coded = false});
+  const VerifyResult result = verify({{.start = 1 - 0.012}, {.start = 1.002 - 0.012}}, uncoded(23.976));
   EXPECT_EQ(result.cameras[1].state, ClipState::direction_unknown);
   EXPECT_FALSE(result.cameras[1].error);
   EXPECT_EQ(result.verdict, ClipsVerdict::not_proven);
@@ -217,7 +162,7 @@ TEST(Verify, AStrobeInTuneTellsNoDirectionByWayOfAFrameRateNearby) {
   for (const int direction : {-1, +1}) {
     for (const double rate : {23.9775, 23.974}) {
       std::vector<Camera> cameras(2, {.start = 1 - 0.012, .direction = direction});
-      for (const CameraVerdict& c : verify(cameras, {.rate = rate, .coded = false}).cameras)
+      for (const CameraVerdict& c : verify(cameras, uncoded(rate)).cameras)
         EXPECT_FALSE(c.clock.mode.direction) << c.clock.mode.direction_reason;
     }
   }
@@ -227,7 +172,7 @@ TEST(Verify, AStrobeInTuneTellsTheDirectionByTheFlashesThatItSkips) {
   for (const int direction : {-1, +1}) {
     const Camera first{.start = 1 - 0.012, .direction = direction};
     const Camera second{.start = 1.002 - 0.012, .direction = direction};
-    const VerifyResult result = verify({first, second}, {.rate = 23.976});
+    const VerifyResult result = verify({first, second}, coded(23.976));
     const CameraVerdict& c = result.cameras[1];
     ASSERT_TRUE(c.clock.mode.direction) << c.clock.mode.direction_reason;
     EXPECT_EQ(static_cast<int>(*c.clock.mode.direction), direction);
@@ -238,22 +183,20 @@ TEST(Verify, AStrobeInTuneTellsTheDirectionByTheFlashesThatItSkips) {
 }
 
 TEST(Verify, ABlindCameraIsNoErrorAndNoSync) {
-  const Strobe tuned{.rate = 23.976};
-  VerifyOptions options = options_of(tuned);
+  VerifyOptions options = options_of(coded(23.976));
   options.clip.direction = ReadDirection::top_first;
   // The flash comes 1.5 ms before the read phase ends its rest.
   const VerifyResult result =
-      verify({{.start = 1 - 0.012}, {.start = std::ceil(23.976) / 23.976 + 0.0015}}, tuned, options);
+      verify({{.start = 1 - 0.012}, {.start = std::ceil(23.976) / 23.976 + 0.0015}}, coded(23.976), options);
   EXPECT_EQ(result.cameras[1].state, ClipState::blind) << result.cameras[1].reason;
   EXPECT_FALSE(result.cameras[1].error);
   EXPECT_THAT(result.to_do, testing::Contains(HasSubstr("Bring the dot of camera 1 out")));
 }
 
 TEST(Verify, AReferenceWithoutPhaseGivesWayToTheNextClip) {
-  std::vector<ClipReading> clips = {film({.start = 1}, {}, "dark"), film({.start = 1}, {}, "a"),
-                                    film({.start = 1.001}, {}, "b")};
+  std::vector<ClipReading> clips = {film({.start = 1}), film({.start = 1}), film({.start = 1.001})};
   for (SmearReading& frame : clips[0].frames) frame = SmearReading{SmearState::no_lamp, {}, {}, "no lamp"};
-  const VerifyResult result = verify_clips(clips, options_of({})).value();
+  const VerifyResult result = verify_clips(clips, options_of()).value();
   EXPECT_EQ(result.reference, 1U);
   EXPECT_EQ(result.cameras[0].state, ClipState::unusable);
   EXPECT_THAT(result.cameras[0].reason, HasSubstr("no lamp"));
@@ -262,9 +205,8 @@ TEST(Verify, AReferenceWithoutPhaseGivesWayToTheNextClip) {
 }
 
 TEST(Verify, AClipOfAnotherStrobeIsFoundOut) {
-  const std::vector<ClipReading> clips = {film({.start = 1}, {}, "a"),
-                                          film({.start = 1}, {.rate = 24.4}, "b")};
-  const VerifyResult result = verify_clips(clips, options_of({})).value();
+  const std::vector<ClipReading> clips = {film({.start = 1}), film({.start = 1}, 1, coded(24.4))};
+  const VerifyResult result = verify_clips(clips, options_of()).value();
   EXPECT_EQ(result.cameras[0].state, ClipState::in_sync);
   EXPECT_TRUE(result.cameras[1].state == ClipState::unusable ||
               result.cameras[1].state == ClipState::direction_unknown)
@@ -275,25 +217,24 @@ TEST(Verify, AClipOfAnotherStrobeIsFoundOut) {
 TEST(Verify, ARoundedClaimOfTheFrameRateIsSeenThrough) {
   for (const auto claim :
        {std::optional(Hertz(24)), std::optional(Hertz(24000.0 / 1001)), std::optional<Hertz>()}) {
-    std::vector<ClipReading> clips = {film({.start = 1}, {}, "a"),
-                                      film({.start = 1.001, .direction = -1}, {}, "b")};
+    std::vector<ClipReading> clips = {film({.start = 1}), film({.start = 1.001, .direction = -1})};
     for (ClipReading& clip : clips) clip.claimed_rate = claim;
-    const VerifyResult result = verify_clips(clips, options_of({})).value();
+    const VerifyResult result = verify_clips(clips, options_of()).value();
     ASSERT_TRUE(result.cameras[1].error) << result.cameras[1].reason;
     EXPECT_NEAR(in_milliseconds(*result.cameras[1].error), -1, 0.01);
   }
 }
 
 TEST(Verify, AClaimFarFromTheStrobesRateIsUnusableAndSaysWhy) {
-  std::vector<ClipReading> clips = {film({.start = 1}, {}, "a"), film({.start = 1}, {}, "b")};
+  std::vector<ClipReading> clips = {film({.start = 1}), film({.start = 1})};
   clips[1].claimed_rate = Hertz(59.94);
-  const VerifyResult result = verify_clips(clips, options_of({})).value();
+  const VerifyResult result = verify_clips(clips, options_of()).value();
   EXPECT_EQ(result.cameras[1].state, ClipState::unusable);
   EXPECT_THAT(result.cameras[1].reason, HasSubstr("59.940 frames a second"));
 }
 
 TEST(Verify, ADotWhoseLampWasNotLitIsNoLamp) {
-  std::vector<ClipReading> clips = {film({.start = 1}, {}, "a"), film({.start = 0.3}, {}, "b")};
+  std::vector<ClipReading> clips = {film({.start = 1}), film({.start = 0.3})};
   int changed = 0;
   for (std::size_t i = 0; i < clips[1].frames.size(); ++i) {
     SmearReading& frame = clips[1].frames[i];
@@ -303,7 +244,7 @@ TEST(Verify, ADotWhoseLampWasNotLitIsNoLamp) {
     ++changed;
   }
   ASSERT_GT(changed, 5);
-  const VerifyResult result = verify_clips(clips, options_of({})).value();
+  const VerifyResult result = verify_clips(clips, options_of()).value();
   EXPECT_EQ(result.cameras[1].frame_offset, truth({.start = 1}, {.start = 0.3}).offset)
       << result.cameras[1].offset_reason;
   EXPECT_EQ(result.cameras[1].clock.numbers.misread, 0);
@@ -316,15 +257,15 @@ TEST(Verify, AShortClipSaysThatItIsShort) {
 }
 
 TEST(Verify, OneClipOrASenselessRateIsRefused) {
-  const std::vector<ClipReading> clips = {film({.start = 1}, {}, "a"), film({.start = 1}, {}, "b")};
-  const auto one = verify_clips(std::span(clips).first(1), options_of({}));
+  const std::vector<ClipReading> clips = {film({.start = 1}), film({.start = 1})};
+  const auto one = verify_clips(std::span(clips).first(1), options_of());
   ASSERT_FALSE(one.ok());
   EXPECT_THAT(one.error().message(), HasSubstr("two cameras"));
   for (const double bad : {0.0, -24.0, std::nan("")}) {
-    VerifyOptions options = options_of({});
+    VerifyOptions options = options_of();
     options.clip.flash_rate = Hertz(bad);
     EXPECT_FALSE(verify_clips(clips, options).ok());
-    options = options_of({});
+    options = options_of();
     options.clip.row_time = SecondsPerRow(bad);
     EXPECT_FALSE(verify_clips(clips, options).ok());
   }

@@ -75,8 +75,8 @@ class BatchRank {
     std::vector<std::string> names;
     for (const auto& [name, chunk] : chunks_) names.push_back(name);
     ledger_.emplace(ledger_of(out_), std::move(names), me_.name());
-    EMBERLOCK_ASSIGN_OR_RETURN(
-        pulse_, recon::Pulse::start(ledger_->folder() / "workers", me_, Seconds(arguments_.patience_s)));
+    EMBERLOCK_ASSIGN_OR_RETURN(pulse_, recon::Pulse::start(ledger_->folder() / "workers", me_,
+                                                           Seconds(arguments_.patience_s), clock_));
     if (rank_.number == 0) {
       EMBERLOCK_RETURN_IF_ERROR(try_again_what_failed());
       progress_.emplace(*ledger_, plan_);

@@ -104,15 +104,17 @@ std::optional<bool> runs_here(const Worker& worker) {
   return start_of(worker.pid) == worker.started;
 }
 
-Result<std::unique_ptr<Pulse>> Pulse::start(const fs::path& workers, const Worker& me, Seconds patience) {
+Result<std::unique_ptr<Pulse>> Pulse::start(const fs::path& workers, const Worker& me, Seconds patience,
+                                            const Clock& clock) {
   EMBERLOCK_RETURN_IF_ERROR(write_file_atomically(workers / me.name(), to_json(me)));
-  return std::unique_ptr<Pulse>(new Pulse(workers, me, patience));
+  return std::unique_ptr<Pulse>(new Pulse(workers, me, patience, clock));
 }
 
-Pulse::Pulse(fs::path workers, const Worker& me, Seconds patience)
+Pulse::Pulse(fs::path workers, const Worker& me, Seconds patience, const Clock& clock)
     : workers_(std::move(workers)),
       mine_(workers_ / me.name()),
       patience_(patience),
+      clock_(clock),
       thread_([this] { beat(); }) {}
 
 Pulse::~Pulse() {

@@ -46,9 +46,9 @@ std::optional<bool> runs_here(const Worker& worker);
 /// looks on: nobody's clock is compared with another's. Those of this machine are asked the kernel for.
 class Pulse {
  public:
-  /// Error: io.
+  /// The clock must outlive the pulse. Error: io.
   static Result<std::unique_ptr<Pulse>> start(const std::filesystem::path& workers, const Worker& me,
-                                              Seconds patience);
+                                              Seconds patience, const Clock& clock);
   /// Takes the worker's file away: it has gone in peace.
   ~Pulse();
   Pulse(const Pulse&) = delete;
@@ -63,12 +63,12 @@ class Pulse {
     std::int64_t changed = 0;  ///< the file's time, ns, of whatever clock
     TimePoint at;              ///< by this machine's clock, when that was first seen
   };
-  Pulse(std::filesystem::path workers, const Worker& me, Seconds patience);
+  Pulse(std::filesystem::path workers, const Worker& me, Seconds patience, const Clock& clock);
   void beat();
 
   std::filesystem::path workers_, mine_;
   Seconds patience_;
-  SteadyClock clock_;
+  const Clock& clock_;
   std::map<std::string, Seen> seen_;
   std::mutex mutex_;
   std::condition_variable ending_;

@@ -1,20 +1,21 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <cstdint>
-
 #include "base/clock.h"
 
 namespace emberlock::test {
 
-/// Time that passes by a millisecond at every look.
+/// Time that passes by a tick at every look, and by what a test lets pass.
 class CountingClock final : public Clock {
  public:
-  [[nodiscard]] TimePoint now() const override { return {1000000 * ++looks_}; }
+  explicit CountingClock(Seconds tick = Seconds(1e-3)) : tick_(tick) {}
+  [[nodiscard]] TimePoint now() const override { return time_ = time_ + tick_; }
   void sleep_until(TimePoint) override {}
+  void pass(Seconds time) { time_ = time_ + time; }
 
  private:
-  mutable std::int64_t looks_ = 0;
+  Seconds tick_;
+  mutable TimePoint time_;
 };
 
 }  // namespace emberlock::test

@@ -65,9 +65,10 @@ double degrees_between(const std::array<double, 3>& a, const Eigen::Vector3d& b)
 }
 
 class FindLight : public testing::TestWithParam<int> {};
+using FindLightSlow = FindLight;
 
 /// Directions that nothing was tuned on, one a seed of the smoke.
-TEST_P(FindLight, DirectionAndColour) {
+TEST_P(FindLightSlow, DirectionAndColour) {
   const int n = GetParam();
   const test::LitScene smoke = small_smoke(n);
   const double z = 2 * test::spread(3 * n, 5) - 1;
@@ -85,7 +86,7 @@ TEST_P(FindLight, DirectionAndColour) {
     EXPECT_NEAR(found.light.strength[c], truth.strength[c], 0.25 * truth.strength[c]);
   }
 }
-INSTANTIATE_TEST_SUITE_P(Sweep, FindLight, testing::Range(1, 7));
+INSTANTIATE_TEST_SUITE_P(Sweep, FindLightSlow, testing::Range(1, 7));
 
 TEST(FindNearbyLight, OneNearbyAndWhereItStands) {
   const test::LitScene smoke = small_smoke(1);
@@ -105,7 +106,7 @@ double lit_held_out_error(const Scene& scene, const Effects& effects) {
   return done.ok() ? all_channels(*done->heldout_rmse) : 0;
 }
 
-TEST(LitSolve, ShowsWhatItDidNotSeeBetterThanGlowingMediaDo) {
+TEST(LitSolveSlow, ShowsWhatItDidNotSeeBetterThanGlowingMediaDo) {
   const test::LitScene smoke = small_smoke(1);
   const Light truth = test::distant_light({1, -0.5, 0.4});
   const Scene scene = film_lit(smoke, lit_truth(smoke, truth));
@@ -118,7 +119,7 @@ TEST(LitSolve, ShowsWhatItDidNotSeeBetterThanGlowingMediaDo) {
   EXPECT_LT(lit_held_out_error(scene, choice->effects), 0.8 * lit_held_out_error(scene, glowing));
 }
 
-TEST(LightChoice, FlamesThatGlowAreNotTakenForLit) {
+TEST(LightChoiceSlow, FlamesThatGlowAreNotTakenForLit) {
   for (const FlameShape shape : {FlameShape::plume, FlameShape::two_plumes}) {
     const Scene scene = small_flame_scene(PerMeter(32.8), shape);
     const auto choice = choose_effects(scene, grid_over(scene.box, 32), {}, find_on_the_cpu());

@@ -66,6 +66,7 @@ class ScalarFlowTest : public testing::Test {
   }
   recon::Scene scene_;
 };
+using ScalarFlowTestSlow = ScalarFlowTest;
 
 /// Whether every view sees a flame pixel where the point lies.
 bool shines_in_all(const recon::Scene& scene, const std::vector<recon::FlameMask>& masks,
@@ -121,7 +122,7 @@ TEST_F(ScalarFlowTest, TheHullHoldsEveryVoxelThatShinesInAllViews) {
   EXPECT_NEAR(static_cast<double>(hull->count), 12163, 0.02 * 12163);
 }
 
-TEST_F(ScalarFlowTest, EachViewHeldOutInTurnIsPredicted) {
+TEST_F(ScalarFlowTestSlow, EachViewHeldOutInTurnIsPredicted) {
   constexpr double kMeasured[] = {11.4, 9.5, 10.7, 9.3, 9.9};
   for (std::size_t view = 0; view < 5; ++view) {
     const recon::Report report = without_view(view, recon::Solver::standard);
@@ -134,7 +135,7 @@ TEST_F(ScalarFlowTest, EachViewHeldOutInTurnIsPredicted) {
   }
 }
 
-TEST_F(ScalarFlowTest, EffectsThatAreFoundAreNeverWorseThanNone) {
+TEST_F(ScalarFlowTestSlow, EffectsThatAreFoundAreNeverWorseThanNone) {
   for (std::size_t view = 0; view < 5; ++view) {
     const recon::Report found = without_view(view, recon::Solver::standard);
     const recon::Report none = without_view(view, recon::Solver::standard, 0, "none");
@@ -146,7 +147,7 @@ TEST_F(ScalarFlowTest, EffectsThatAreFoundAreNeverWorseThanNone) {
   }
 }
 
-TEST_F(ScalarFlowTest, TheDefaultSolverBeatsThePapersAfterManyMoreIterations) {
+TEST_F(ScalarFlowTestSlow, TheDefaultSolverBeatsThePapersAfterManyMoreIterations) {
   // Left alone the paper's solver stops after 537 iterations, at 16.0; a hundred are what a test can wait
   // for.
   const recon::Report ours = without_view(1, recon::Solver::standard);

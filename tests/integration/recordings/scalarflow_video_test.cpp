@@ -95,7 +95,7 @@ Shown reconstructed(const recon::Scene& scene, const char* effects, bool correct
           static_cast<int>(outcome->report.warnings.size())};
 }
 
-TEST(ScalarFlowVideo, EveryFrameIsFoundAndAutoIsNeverWorseThanNone) {
+TEST(ScalarFlowVideoSlow, EveryFrameIsFoundAndAutoIsNeverWorseThanNone) {
   const int every = std::getenv("EMBERLOCK_FRAMES") != nullptr ? 1 : 12;
   Plume plume;
   double sum = 0;
@@ -117,7 +117,7 @@ TEST(ScalarFlowVideo, EveryFrameIsFoundAndAutoIsNeverWorseThanNone) {
 }
 
 /// View 1 points some 19 pixels beside its calibration: the plume's outlines don't meet.
-TEST(ScalarFlowVideo, ACameraThatPointsBesideItsCalibrationIsPutRightAndSaid) {
+TEST(ScalarFlowVideoSlow, ACameraThatPointsBesideItsCalibrationIsPutRightAndSaid) {
   Plume plume;
   for (int n = 0; n < 40; ++n) plume.next();
   const recon::Scene scene = plume.next();

@@ -5,7 +5,6 @@
 #include <fstream>
 #include <map>
 #include <string>
-#include <thread>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -15,7 +14,10 @@
 #include "recon/batch/plan.h"
 #include "recon/batch/pulse.h"
 #include "recon/batch/rank.h"
+#include "tests/support/counting_clock.h"
 #include "tests/support/recording.h"
+#include "tests/support/results.h"
+#include "tests/support/wait.h"
 
 namespace emberlock::recon {
 namespace {
@@ -47,11 +49,10 @@ TEST(BatchPlanTest, ItsChunksHoldEachFrameOnceInOrderAndSortByName) {
 }
 
 TEST(BatchPlanTest, IsWrittenAndReadToTheSame) {
-  const auto read = parse_plan(to_json(plan()), "here");
-  ASSERT_TRUE(read.ok()) << read.error().message();
-  EXPECT_TRUE(same_run(*read, plan(), "here").ok());
-  EXPECT_EQ(read->voxels, 32);
-  EXPECT_EQ(read->input, "s");
+  const auto read = value_of(parse_plan(to_json(plan()), "here"));
+  EXPECT_TRUE(same_run(read, plan(), "here").ok());
+  EXPECT_EQ(read.voxels, 32);
+  EXPECT_EQ(read.input, "s");
   for (const char* bad : {"", "{}", "[1]", R"({"format": "emberlock sequence", "version": 1})"})
     EXPECT_EQ(parse_plan(bad, "here").error().kind, ErrorKind::bad_input) << bad;
   for (const char* number : {"99999999999999999999", "1e29", "-1", "3000000000", "2.5"}) {
@@ -160,8 +161,8 @@ TEST(PulseTest, AProcessOfThisMachineIsAliveUntilItEnds) {
   worker.boot = "another machine's";
   EXPECT_EQ(runs_here(worker), std::nullopt);
 
-  const auto pulse = Pulse::start(temp.path(), Worker::here(1, "cpu"), Seconds(60));
-  ASSERT_TRUE(pulse.ok()) << pulse.error().message();
+  const test::CountingClock clock;
+  const auto pulse = value_of(Pulse::start(temp.path(), Worker::here(1, "cpu"), Seconds(60), clock));
   // The child's own record, made here: the fields of its stat that matter are the kernel's.
   std::ifstream stat("/proc/" + std::to_string(child) + "/stat");
   std::string text{std::istreambuf_iterator<char>(stat), {}}, field;
@@ -171,18 +172,19 @@ TEST(PulseTest, AProcessOfThisMachineIsAliveUntilItEnds) {
   forked.pid = child;
   forked.started = std::stoull(field);
   std::ofstream(temp / forked.name()) << to_json(forked);
-  EXPECT_EQ((*pulse)->life_of(forked.name()), Life::alive);
+  EXPECT_EQ(pulse->life_of(forked.name()), Life::alive);
   ::kill(child, SIGKILL);
   siginfo_t ended{};
   ::waitid(P_PID, static_cast<id_t>(child), &ended, WEXITED | WNOWAIT);  // a zombie still has its number
-  EXPECT_EQ((*pulse)->life_of(forked.name()), Life::gone);
+  EXPECT_EQ(pulse->life_of(forked.name()), Life::gone);
   ::waitpid(child, nullptr, 0);
-  EXPECT_EQ((*pulse)->life_of(forked.name()), Life::gone);
+  EXPECT_EQ(pulse->life_of(forked.name()), Life::gone);
 }
 
 TEST(PulseTest, OneOfAnotherMachineIsAliveWhileItsFileChangesWhateverItsTime) {
   const test::TempFolder temp;
-  const auto pulse = std::move(Pulse::start(temp.path(), Worker::here(0, "cpu"), Seconds(0.2))).value();
+  test::CountingClock clock(Seconds(0));
+  const auto pulse = value_of(Pulse::start(temp.path(), Worker::here(0, "cpu"), Seconds(60), clock));
   Worker other = Worker::here(1, "cpu");
   other.boot = "another machine's";
   other.host = "n2";
@@ -193,9 +195,9 @@ TEST(PulseTest, OneOfAnotherMachineIsAliveWhileItsFileChangesWhateverItsTime) {
   for (int beat = 0; beat < 6; ++beat) {  // by a clock that is a year late
     fs::last_write_time(file, long_ago + std::chrono::seconds(beat));
     EXPECT_EQ(pulse->life_of(other.name()), Life::alive) << beat;
-    std::this_thread::sleep_for(std::chrono::milliseconds(60));
+    clock.pass(Seconds(59));
   }
-  std::this_thread::sleep_for(std::chrono::milliseconds(250));
+  clock.pass(Seconds(2));
   EXPECT_EQ(pulse->life_of(other.name()), Life::silent);
   fs::last_write_time(file, long_ago);
   EXPECT_EQ(pulse->life_of(other.name()), Life::alive) << "it has woken";
@@ -207,7 +209,8 @@ TEST(PulseTest, AFileServerThatDoesntAnswerKillsNobodyAtOnce) {
   const test::TempFolder temp;
   const fs::path workers = temp / "workers";
   fs::create_directory(workers);
-  const auto pulse = std::move(Pulse::start(workers, Worker::here(0, "cpu"), Seconds(0.1))).value();
+  test::CountingClock clock(Seconds(0));
+  const auto pulse = value_of(Pulse::start(workers, Worker::here(0, "cpu"), Seconds(60), clock));
   Worker other = Worker::here(1, "cpu");
   other.boot = "another machine's";
   std::ofstream(workers / other.name()) << to_json(other);
@@ -215,7 +218,7 @@ TEST(PulseTest, AFileServerThatDoesntAnswerKillsNobodyAtOnce) {
   fs::rename(workers, temp / "away");
   std::ofstream(workers) << "no folder";  // ENOTDIR, as ESTALE
   EXPECT_EQ(pulse->life_of(other.name()), Life::alive);
-  std::this_thread::sleep_for(std::chrono::milliseconds(150));
+  clock.pass(Seconds(61));
   EXPECT_EQ(pulse->life_of(other.name()), Life::silent);
   fs::remove(workers);
   fs::rename(temp / "away", workers);
@@ -227,10 +230,10 @@ TEST(PulseTest, BeatsWhileItLivesAndLeavesNothing) {
   const test::TempFolder temp;
   const Worker me = Worker::here(3, "cpu");
   {
-    const auto pulse = std::move(Pulse::start(temp.path(), me, Seconds(0.12))).value();
+    const test::CountingClock clock;
+    const auto pulse = value_of(Pulse::start(temp.path(), me, Seconds(0.12), clock));
     const auto before = fs::last_write_time(temp / me.name());
-    while (fs::last_write_time(temp / me.name()) == before)
-      std::this_thread::sleep_for(std::chrono::milliseconds(5));
+    EXPECT_TRUE(test::wait_until([&] { return fs::last_write_time(temp / me.name()) != before; }));
     const auto workers = workers_in(temp.path());
     ASSERT_TRUE(workers.contains(me.name()));
     EXPECT_EQ(workers.at(me.name()).rank, 3);

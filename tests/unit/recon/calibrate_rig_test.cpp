@@ -25,7 +25,7 @@ void keep(BoardSightings& sightings, auto wanted) {
   std::erase_if(sightings.sightings, [&](const BoardSightings::Sighting& s) { return !wanted(s); });
 }
 
-TEST(CalibrateRig, ARingWithWrongCornersIsFoundAndItsUncertaintiesAreRight) {
+TEST(CalibrateRigSlow, ARingWithWrongCornersIsFoundAndItsUncertaintiesAreRight) {
   test::BoardRigOptions options = small_rig(6, 26);
   const test::BoardRig rig = test::board_rig(options);
   const auto found = calibrate_rig(rig.sightings, {.world = "0"});

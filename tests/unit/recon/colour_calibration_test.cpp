@@ -13,7 +13,7 @@ namespace {
 
 using testing::HasSubstr;
 
-TEST(CalibrateColour, ElevenUnlikeCamerasShowNewPatchesAlikeToOnePercent) {
+TEST(CalibrateColourSlow, ElevenUnlikeCamerasShowNewPatchesAlikeToOnePercent) {
   const auto rig = test::colour_rig(11, 1);
   const auto calibration = calibrate_colour(test::film_target(rig, 1));
   ASSERT_TRUE(calibration.ok()) << calibration.error().message();
@@ -29,7 +29,7 @@ TEST(CalibrateColour, ElevenUnlikeCamerasShowNewPatchesAlikeToOnePercent) {
   EXPECT_LE(after.unmarked, 1) << "one saturated pixel by itself is a hot one";
 }
 
-TEST(CalibrateColour, AFlatPictureTakesDustOut) {
+TEST(CalibrateColourSlow, AFlatPictureTakesDustOut) {
   auto rig = test::colour_rig(2, 2);
   test::put_dust(rig[0], 2);
   ColourReadings readings = test::film_target(rig, 2);
@@ -46,7 +46,7 @@ TEST(CalibrateColour, AFlatPictureTakesDustOut) {
 }
 
 /// Thousands of a flat picture's cells must not talk the response into one that is blind to their dust.
-TEST(CalibrateColour, ATargetInOnePlaceAndDustyFlatPicturesAreEnough) {
+TEST(CalibrateColourSlow, ATargetInOnePlaceAndDustyFlatPicturesAreEnough) {
   auto rig = test::colour_rig(2, 2);
   for (std::size_t i = 0; i < rig.size(); ++i) test::put_dust(rig[i], 2 + i);
   ColourReadings readings =
@@ -58,7 +58,7 @@ TEST(CalibrateColour, ATargetInOnePlaceAndDustyFlatPicturesAreEnough) {
   for (const CalibratedColour& camera : calibration->cameras) EXPECT_TRUE(camera.vignetting_known);
 }
 
-TEST(CalibrateColour, AResponseThatMostReadingsContradictIsNoResult) {
+TEST(CalibrateColourSlow, AResponseThatMostReadingsContradictIsNoResult) {
   const auto rig = test::colour_rig(2, 8);
   ColourReadings readings = test::film_target(rig, 8);
   RandomStream random(1, 2);
@@ -73,7 +73,7 @@ TEST(CalibrateColour, AResponseThatMostReadingsContradictIsNoResult) {
   EXPECT_THAT(calibration.error().message(), HasSubstr("camera cam1"));
 }
 
-TEST(CalibrateColour, CamerasOfDifferentResolutionsAreMatched) {
+TEST(CalibrateColourSlow, CamerasOfDifferentResolutionsAreMatched) {
   auto rig = test::colour_rig(3, 7);
   rig[1].size = {320, 240};
   rig[2].size = {800, 450};
@@ -104,7 +104,7 @@ TEST(FlatField, IsLinearBetweenItsCellsAndSurvivesItsMessage) {
   EXPECT_THAT(read_colour(message, {4, 2}, "camera a").error().message(), HasSubstr("without light"));
 }
 
-TEST(CalibrateColour, GainsLieWithinTheirStatedUncertaintyAndHaveTheMeanOne) {
+TEST(CalibrateColourSlow, GainsLieWithinTheirStatedUncertaintyAndHaveTheMeanOne) {
   const auto rig = test::colour_rig(4, 3);
   const auto calibration = calibrate_colour(test::film_target(rig, 3));
   ASSERT_TRUE(calibration.ok()) << calibration.error().message();
@@ -128,7 +128,7 @@ TEST(CalibrateColour, GainsLieWithinTheirStatedUncertaintyAndHaveTheMeanOne) {
   }
 }
 
-TEST(CalibrateColour, AResponseThatIsNoPowerLawIsFound) {
+TEST(CalibrateColourSlow, AResponseThatIsNoPowerLawIsFound) {
   auto rig = test::colour_rig(2, 4);
   for (test::ColourTruth& camera : rig) camera.toe = 0.5;
   const auto calibration = calibrate_colour(test::film_target(rig, 4));
@@ -142,7 +142,7 @@ TEST(CalibrateColour, AResponseThatIsNoPowerLawIsFound) {
   }
 }
 
-TEST(CalibrateColour, WrongPatchesAreLeftOut) {
+TEST(CalibrateColourSlow, WrongPatchesAreLeftOut) {
   const auto rig = test::colour_rig(2, 6);
   ColourReadings readings = test::film_target(rig, 6);
   for (std::size_t i = 0; i < readings.patches.size(); i += 20)
@@ -153,7 +153,7 @@ TEST(CalibrateColour, WrongPatchesAreLeftOut) {
   EXPECT_GT(calibration->cameras[0].uses[static_cast<std::size_t>(ReadingUse::outlier)], 5);
 }
 
-TEST(CalibrateColour, KnownRadiancesTellTheResponseWithoutAnExposureSeries) {
+TEST(CalibrateColourSlow, KnownRadiancesTellTheResponseWithoutAnExposureSeries) {
   const auto rig = test::colour_rig(2, 8);
   ColourReadings readings =
       test::film_target(rig, 8, {.exposures = {1}, .patches = 8, .dark = true, .places = 5});
@@ -165,7 +165,7 @@ TEST(CalibrateColour, KnownRadiancesTellTheResponseWithoutAnExposureSeries) {
   EXPECT_LE(test::held_out_spread(rig, &*calibration, 9).worst, 0.01);
 }
 
-TEST(CalibrateColour, AToldGammaIsTaken) {
+TEST(CalibrateColourSlow, AToldGammaIsTaken) {
   auto rig = test::colour_rig(2, 8);
   for (test::ColourTruth& camera : rig) camera.gamma = 2.2;
   const auto calibration = calibrate_colour(
@@ -176,7 +176,7 @@ TEST(CalibrateColour, AToldGammaIsTaken) {
   EXPECT_THAT(calibrate_colour({}, {.gamma = 9.0}).error().message(), HasSubstr("--gamma"));
 }
 
-TEST(CalibrateColour, EveryPatchSaturatedIsSaidSo) {
+TEST(CalibrateColourSlow, EveryPatchSaturatedIsSaidSo) {
   const auto rig = test::colour_rig(2, 8);
   ColourReadings readings = test::film_target(rig, 8);
   for (PatchReading& p : readings.patches) p.saturated = {1, 1, 1};
@@ -186,7 +186,7 @@ TEST(CalibrateColour, EveryPatchSaturatedIsSaidSo) {
   EXPECT_THAT(calibration.error().message(), HasSubstr("are saturated"));
 }
 
-TEST(CalibrateColour, ACameraThatSharesNoPatchIsNamedAndTheOthersAreCalibrated) {
+TEST(CalibrateColourSlow, ACameraThatSharesNoPatchIsNamedAndTheOthersAreCalibrated) {
   const auto rig = test::colour_rig(3, 8);
   ColourReadings readings = test::film_target(rig, 8);
   for (PatchReading& p : readings.patches)
@@ -203,7 +203,7 @@ TEST(CalibrateColour, ACameraThatSharesNoPatchIsNamedAndTheOthersAreCalibrated) 
   EXPECT_LE(test::held_out_spread({rig[0], rig[2]}, &others, 9).worst, 0.01);
 }
 
-TEST(CalibrateColour, SamplesThatFallWithLightAreRefused) {
+TEST(CalibrateColourSlow, SamplesThatFallWithLightAreRefused) {
   const auto rig = test::colour_rig(2, 8);
   ColourReadings readings = test::film_target(rig, 8);
   for (PatchReading& p : readings.patches)
@@ -214,7 +214,7 @@ TEST(CalibrateColour, SamplesThatFallWithLightAreRefused) {
   EXPECT_THAT(calibration.error().message(), HasSubstr("more exposure makes it darker"));
 }
 
-TEST(CalibrateColour, DarkPicturesBrighterThanTheTargetAreRefused) {
+TEST(CalibrateColourSlow, DarkPicturesBrighterThanTheTargetAreRefused) {
   const auto rig = test::colour_rig(2, 8);
   ColourReadings readings = test::film_target(rig, 8);
   for (auto& histogram : readings.cameras[1].dark.histogram) {
@@ -225,7 +225,7 @@ TEST(CalibrateColour, DarkPicturesBrighterThanTheTargetAreRefused) {
               HasSubstr("camera cam1: its dark pictures are brighter"));
 }
 
-TEST(CalibrateColour, OnePlaceAloneTellsNoVignetting) {
+TEST(CalibrateColourSlow, OnePlaceAloneTellsNoVignetting) {
   const auto rig = test::colour_rig(2, 8);
   ColourReadings readings = test::film_target(rig, 8);
   std::erase_if(readings.patches,

@@ -23,7 +23,7 @@ test::BoardRigOptions later_views(std::uint64_t seed) {
   return options;
 }
 
-TEST(Drift, ARigThatStoodStillHolds) {
+TEST(DriftSlow, ARigThatStoodStillHolds) {
   for (const std::uint64_t seed : {1, 2}) {
     const test::BoardRig rig = test::board_rig(later_views(seed));
     const auto report = check_drift(test::rig_file_of(rig), rig.sightings, "rig.json");
@@ -35,7 +35,7 @@ TEST(Drift, ARigThatStoodStillHolds) {
   }
 }
 
-TEST(Drift, TheCameraThatWasKnockedIsNamedWithItsMotion) {
+TEST(DriftSlow, TheCameraThatWasKnockedIsNamedWithItsMotion) {
   const test::BoardRig rig = test::board_rig(later_views(3));
   v1::Rig file = test::rig_file_of(rig);
   const Eigen::Vector3d aside(1e-3, 0, 0);
@@ -53,7 +53,7 @@ TEST(Drift, TheCameraThatWasKnockedIsNamedWithItsMotion) {
 }
 
 /// By its own calibration, whose turns are five times as uncertain as its rays.
-TEST(Drift, AFoundRigsSmallTurnIsNamedAndNoNeighbour) {
+TEST(DriftSlow, AFoundRigsSmallTurnIsNamedAndNoNeighbour) {
   test::BoardRigOptions options;
   options.cameras = 5;
   options.instants = 52;
@@ -79,7 +79,7 @@ TEST(Drift, AFoundRigsSmallTurnIsNamedAndNoNeighbour) {
   EXPECT_LT(turned->cameras[2].turn_sigma, 0.05 * kDegree);
 }
 
-TEST(Drift, AChangedZoomIsTheLenss) {
+TEST(DriftSlow, AChangedZoomIsTheLenss) {
   const test::BoardRig rig = test::board_rig(later_views(4));
   v1::Rig file = test::rig_file_of(rig);
   v1::Calibration& c = *file.mutable_cameras(1)->mutable_calibration();
@@ -90,7 +90,7 @@ TEST(Drift, AChangedZoomIsTheLenss) {
   EXPECT_THAT(report->cameras[1].why, HasSubstr("zoom or focus"));
 }
 
-TEST(Drift, ARigThatDoesntFitIsAnError) {
+TEST(DriftSlow, ARigThatDoesntFitIsAnError) {
   const test::BoardRig rig = test::board_rig(later_views(5));
   v1::Rig file = test::rig_file_of(rig);
   file.mutable_cameras(1)->set_width(1280);
@@ -112,7 +112,7 @@ test::BoardRig lamp_rig(int cameras, std::uint64_t seed) {
   return test::board_rig(options);
 }
 
-TEST(LampDrift, StillRigsHoldAndTheCameraThatTurnedIsNamed) {
+TEST(LampDriftSlow, StillRigsHoldAndTheCameraThatTurnedIsNamed) {
   int false_alarms = 0;
   for (std::uint64_t seed = 1; seed <= 30; ++seed) {
     const test::BoardRig rig = lamp_rig(6, seed);
@@ -134,7 +134,7 @@ TEST(LampDrift, StillRigsHoldAndTheCameraThatTurnedIsNamed) {
   EXPECT_EQ(false_alarms, 0) << "one in a thousand is meant";
 }
 
-TEST(LampDrift, OnePlaceTellsOnlyATurn) {
+TEST(LampDriftSlow, OnePlaceTellsOnlyATurn) {
   const test::BoardRig rig = lamp_rig(6, 7);
   const auto lamps = test::lamp_sightings(rig, test::lamp_places(rig, 1, 7), 0.3, 7);
   v1::Rig file = test::rig_file_of(rig);
@@ -153,7 +153,7 @@ TEST(LampDrift, OnePlaceTellsOnlyATurn) {
   for (const std::size_t c : {0U, 2U, 3U, 4U, 5U}) EXPECT_EQ(turned->cameras[c].verdict, DriftVerdict::still);
 }
 
-TEST(LampDrift, TwoCamerasTellThatOneOfThemMoved) {
+TEST(LampDriftSlow, TwoCamerasTellThatOneOfThemMoved) {
   for (const int places : {1, 4, 8}) {
     const test::BoardRig rig = lamp_rig(2, 3);
     const auto lamps = test::lamp_sightings(rig, test::lamp_places(rig, places, 3), 0.2, 3);
@@ -170,7 +170,7 @@ TEST(LampDrift, TwoCamerasTellThatOneOfThemMoved) {
   }
 }
 
-TEST(LampDrift, ALampThatNoTwoCamerasSeeIsAnError) {
+TEST(LampDriftSlow, ALampThatNoTwoCamerasSeeIsAnError) {
   const test::BoardRig rig = lamp_rig(3, 2);
   auto lamps = test::lamp_sightings(rig, test::lamp_places(rig, 3, 2), 0.2, 2);
   std::erase_if(lamps.sightings, [](const auto& s) { return s.camera != s.instant; });

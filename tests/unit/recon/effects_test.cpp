@@ -15,6 +15,7 @@ namespace emberlock::recon {
 namespace {
 
 ON_EACH_DEVICE(EffectsTest);
+ON_EACH_DEVICE(EffectsTestSlow);
 
 /// Searched once for all tests of a device.
 const EffectChoice& found(PerMeter extinction, FlameShape shape) {
@@ -40,7 +41,7 @@ TEST_P(EffectsTest, EmissionOnlyFlameIsFoundAsSuch) {
   }
 }
 
-TEST_P(EffectsTest, WhatThePicturesTellBeatsKnowingTheExtinctionButNotWhereItIs) {
+TEST_P(EffectsTestSlow, WhatThePicturesTellBeatsKnowingTheExtinctionButNotWhereItIs) {
   for (const FlameShape shape : {FlameShape::plume, FlameShape::two_plumes}) {
     const Scene scene = small_flame_scene(PerMeter(32.8), shape);
     const auto heldout = [&](const Effects& effects) {
@@ -56,7 +57,7 @@ TEST_P(EffectsTest, WhatThePicturesTellBeatsKnowingTheExtinctionButNotWhereItIs)
   }
 }
 
-TEST_P(EffectsTest, ConstantExtinctionIsFoundWithinAFactorOfTwo) {
+TEST_P(EffectsTestSlow, ConstantExtinctionIsFoundWithinAFactorOfTwo) {
   for (const FlameShape shape : {FlameShape::plume, FlameShape::two_plumes}) {
     const EffectChoice& choice = found(PerMeter(32.8), shape);
     EXPECT_TRUE(choice.reports[0].on);

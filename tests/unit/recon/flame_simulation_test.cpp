@@ -15,6 +15,7 @@ namespace emberlock::recon {
 namespace {
 
 ON_EACH_DEVICE(FlameSimulationTest);
+ON_EACH_DEVICE(FlameSimulationTestSlow);
 
 constexpr FlamePreset kAll[] = {FlamePreset::candle, FlamePreset::pool_fire, FlamePreset::torch,
                                 FlamePreset::two_plumes, FlamePreset::smoke};
@@ -108,7 +109,7 @@ TEST(FlameSimulationDevices, OthersMeetTheCpu) {
 }
 
 /// 0.10 m/s of vapour at 600 K out of a wick of 3 mm radius, 44.6 MJ/kg: little of it leaves as soot.
-TEST_P(FlameSimulationTest, ACandleBurnsWhatItsWickGives) {
+TEST_P(FlameSimulationTestSlow, ACandleBurnsWhatItsWickGives) {
   FlameSimulationOptions o = flame_preset(FlamePreset::candle, 16);
   o.compute.threads = 2;
   auto flame = FlameSimulation::make(o);
@@ -188,7 +189,7 @@ TEST_P(FlameSimulationTest, TinyAndHugeDomains) {
     }
 }
 
-TEST_P(FlameSimulationTest, GoesOnOnAGridTwiceAsFine) {
+TEST_P(FlameSimulationTestSlow, GoesOnOnAGridTwiceAsFine) {
   for (const FlamePreset preset : {FlamePreset::torch, FlamePreset::smoke}) {
     const FlameSimulationOptions o = small(preset);
     auto flame = FlameSimulation::make(o);

@@ -17,6 +17,7 @@ namespace emberlock::recon {
 namespace {
 
 ON_EACH_DEVICE(Fluid);
+ON_EACH_DEVICE(FluidSlow);
 
 constexpr double kPi = std::numbers::pi;
 constexpr double kLeastOrder = 1.8;
@@ -88,7 +89,7 @@ double mac_cormack_error(int n) {
   return turn.error(in.values(), kPi / 2);
 }
 
-TEST_P(Fluid, MacCormackIsOfSecondOrder) {
+TEST_P(FluidSlow, MacCormackIsOfSecondOrder) {
   const double e[3] = {mac_cormack_error(32), mac_cormack_error(64), mac_cormack_error(128)};
   RecordProperty("order_64", std::to_string(order(e[0], e[1])));
   RecordProperty("order_128", std::to_string(order(e[1], e[2])));
@@ -171,7 +172,7 @@ double transport_error(int n) {
   return turn.error(in.values(), kPi / 2);
 }
 
-TEST_P(Fluid, TransportIsOfSecondOrder) {
+TEST_P(FluidSlow, TransportIsOfSecondOrder) {
   const double e[3] = {transport_error(32), transport_error(64), transport_error(128)};
   RecordProperty("order_64", std::to_string(order(e[0], e[1])));
   RecordProperty("order_128", std::to_string(order(e[1], e[2])));

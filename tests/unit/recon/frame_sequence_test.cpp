@@ -18,6 +18,7 @@ namespace emberlock::recon {
 namespace {
 
 ON_EACH_DEVICE(FrameSequenceTest);
+ON_EACH_DEVICE(FrameSequenceTestSlow);
 
 /// A rising flame, frame by frame at 60 Hz.
 Scene filmed(int number) {
@@ -47,7 +48,7 @@ ReconstructOptions options(Asked effects = Asked::known) {
 
 double error_of(const Outcome& outcome) { return all_channels(*outcome.report.heldout_rmse); }
 
-TEST_P(FrameSequenceTest, FramesStartWhereTheFlameIsThoughtToBeAndAreAsGoodAsAlone) {
+TEST_P(FrameSequenceTestSlow, FramesStartWhereTheFlameIsThoughtToBeAndAreAsGoodAsAlone) {
   const SteadyClock clock;
   FrameSequence sequence(options(Asked::found_out), clock);
   for (int n = 0; n < 3; ++n) {

@@ -168,12 +168,16 @@ class GaussNewtonTest : public testing::TestWithParam<Extinction::Model> {
   Points x_;
   TiesAt ties_at_;
 };
+using GaussNewtonTestSlow = GaussNewtonTest;
 
 INSTANTIATE_TEST_SUITE_P(Extinctions, GaussNewtonTest,
                          testing::Values(Extinction::Model::none, Extinction::Model::constant,
                                          Extinction::Model::field));
+INSTANTIATE_TEST_SUITE_P(Extinctions, GaussNewtonTestSlow,
+                         testing::Values(Extinction::Model::none, Extinction::Model::constant,
+                                         Extinction::Model::field));
 
-TEST_P(GaussNewtonTest, IsTheHessianOfDoublePrecisionMarches) {
+TEST_P(GaussNewtonTestSlow, IsTheHessianOfDoublePrecisionMarches) {
   GaussNewton hessian(posed_.level, posed_.setup, x_);
   EXPECT_FALSE(hessian.moves(7, 1));
   const Eigen::MatrixXd j = jacobian(hessian);
@@ -190,7 +194,7 @@ TEST_P(GaussNewtonTest, IsTheHessianOfDoublePrecisionMarches) {
   EXPECT_LT((flat(hessian.apply(d)) - expected).norm() / expected.norm(), field() ? 3e-3 : 1e-4);
 }
 
-TEST_P(GaussNewtonTest, IsInvertedByConjugateGradients) {
+TEST_P(GaussNewtonTestSlow, IsInvertedByConjugateGradients) {
   GaussNewton hessian(posed_.level, posed_.setup, x_);
   const Eigen::MatrixXd j = jacobian(hessian);
   Eigen::MatrixXd h = j.transpose() * j + ties(hessian);

@@ -56,8 +56,9 @@ class HardScene : public testing::TestWithParam<std::tuple<Device, Solver>> {
     EXPECT_LE(all_channels(r->trace.back().input_rmse), 1.05 * least + 1e-4);
   }
 };
+using HardSceneSlow = HardScene;
 
-TEST_P(HardScene, NeitherFewViewsNorThickMediaDiverge) {
+TEST_P(HardSceneSlow, NeitherFewViewsNorThickMediaDiverge) {
   const double edge = 0.2 / 16;
   for (const int views : {4, 10, 28})
     for (const double tau : {0.01, 0.05, 0.2, 0.5}) {
@@ -67,27 +68,27 @@ TEST_P(HardScene, NeitherFewViewsNorThickMediaDiverge) {
     }
 }
 
-TEST_P(HardScene, PixelsAsWideAsTheVoxelsDoNotDiverge) {
+TEST_P(HardSceneSlow, PixelsAsWideAsTheVoxelsDoNotDiverge) {
   for (const int width : {24, 48, 84, 96}) {  // 0.6 to 2.3 pixels a voxel
     SCOPED_TRACE(width);
     expect_stable(solve_on(scene_of(10, 0, kFullCircle, width), 24, 0));
   }
 }
 
-TEST_P(HardScene, OneView) { expect_stable(solve_on(scene_of(1), 16)); }
-TEST_P(HardScene, TwoOppositeViews) { expect_stable(solve_on(scene_of(2), 16)); }
-TEST_P(HardScene, TenViewsWithinTenDegrees) {
+TEST_P(HardSceneSlow, OneView) { expect_stable(solve_on(scene_of(1), 16)); }
+TEST_P(HardSceneSlow, TwoOppositeViews) { expect_stable(solve_on(scene_of(2), 16)); }
+TEST_P(HardSceneSlow, TenViewsWithinTenDegrees) {
   expect_stable(solve_on(scene_of(10, 32.8, std::numbers::pi / 18), 16));
 }
 
-TEST_P(HardScene, ExtinctionFromNearlyNoneToAMillionAMetre) {
+TEST_P(HardSceneSlow, ExtinctionFromNearlyNoneToAMillionAMetre) {
   for (const double extinction : {1e-6, 400.0, 1e3, 1e6}) {
     SCOPED_TRACE(extinction);
     expect_stable(solve_on(scene_of(10), 16, extinction));
   }
 }
 
-TEST_P(HardScene, SaturatedViews) {
+TEST_P(HardSceneSlow, SaturatedViews) {
   Scene scene = scene_of(10);
   for (View& view : scene.views)
     edit(view.image, [](RadianceImage& image) {
@@ -96,7 +97,7 @@ TEST_P(HardScene, SaturatedViews) {
   expect_stable(solve_on(scene, 16));
 }
 
-TEST_P(HardScene, OneVoxelOneRowAndOneColumnOfVoxels) {
+TEST_P(HardSceneSlow, OneVoxelOneRowAndOneColumnOfVoxels) {
   Scene scene = scene_of(10);
   for (const Eigen::Vector3d& size : {Eigen::Vector3d(0.02, 0.02, 0.02), Eigen::Vector3d(0.02, 0.14, 0.02),
                                       Eigen::Vector3d(0.02, 0.02, 0.14)}) {
@@ -108,7 +109,7 @@ TEST_P(HardScene, OneVoxelOneRowAndOneColumnOfVoxels) {
   }
 }
 
-TEST_P(HardScene, TenThousandIterationsNeitherDriftNorDiverge) {
+TEST_P(HardSceneSlow, TenThousandIterationsNeitherDriftNorDiverge) {
   RingOptions ring;
   ring.views = 4;
   ring.image = {16, 12};
@@ -122,7 +123,7 @@ TEST_P(HardScene, TenThousandIterationsNeitherDriftNorDiverge) {
   EXPECT_LT(error(9999), 0.7 * error(0));
 }
 
-TEST_P(HardScene, AThresholdAboveEverythingIsAnErrorThatNamesAView) {
+TEST_P(HardSceneSlow, AThresholdAboveEverythingIsAnErrorThatNamesAView) {
   SolveOptions o = options();
   o.flame_threshold = 1000;
   const Scene& scene = scene_of(10);
@@ -132,7 +133,7 @@ TEST_P(HardScene, AThresholdAboveEverythingIsAnErrorThatNamesAView) {
   EXPECT_EQ(r.error().where, "camera 0");
 }
 
-TEST_P(HardScene, ABlackViewIsAnErrorThatNamesIt) {
+TEST_P(HardSceneSlow, ABlackViewIsAnErrorThatNamesIt) {
   Scene scene = scene_of(10);
   scene.views[3].image = share(RadianceImage(scene.views[3].image->size));
   const auto r = solve_on(scene, 16);
@@ -140,7 +141,7 @@ TEST_P(HardScene, ABlackViewIsAnErrorThatNamesIt) {
   EXPECT_EQ(r.error().where, "camera 3");
 }
 
-TEST_P(HardScene, NanAndInfiniteInputIsAnErrorThatNamesItsView) {
+TEST_P(HardSceneSlow, NanAndInfiniteInputIsAnErrorThatNamesItsView) {
   const auto refused = [](const std::function<void(View&)>& spoil) {
     Scene scene = scene_of(10);
     spoil(scene.views[4]);
@@ -165,7 +166,7 @@ TEST_P(HardScene, NanAndInfiniteInputIsAnErrorThatNamesItsView) {
   EXPECT_TRUE(refused([](View& v) { v.camera.intrinsics.distortion.k2 = INFINITY; }));
 }
 
-INSTANTIATE_TEST_SUITE_P(Devices, HardScene,
+INSTANTIATE_TEST_SUITE_P(Devices, HardSceneSlow,
                          testing::Combine(testing::ValuesIn(devices()),
                                           testing::Values(Solver::standard, Solver::paper)),
                          [](const auto& p) {

@@ -199,7 +199,7 @@ struct LightSearch {
   }
 };
 
-TEST(LightChoice, WithoutTimeToCompareNothingIsBelieved) {
+TEST(LightChoiceSlow, WithoutTimeToCompareNothingIsBelieved) {
   LightSearch search;
   search.options.budget = Seconds(1);
   const FoundLight found = search.with_setup([&](const SolverSetup& setup) {
@@ -214,7 +214,7 @@ TEST(LightChoice, WithoutTimeToCompareNothingIsBelieved) {
   EXPECT_THAT(cut.reason, Not(HasSubstr("inf")));
 }
 
-TEST(LightChoice, OfALightByHandNothingIsSaidThatWasNotTried) {
+TEST(LightChoiceSlow, OfALightByHandNothingIsSaidThatWasNotTried) {
   LightSearch search;
   EffectRequest request;
   request.fixed = under_light(light_at(Source::distant, {1, -0.5, 0.4}));

@@ -68,7 +68,7 @@ Scene staggered_scene(double part) {
   return paper_scene(options);
 }
 
-TEST(MotionTest, StaggeredCamerasSeeBetweenTheirInstantsAsWellAsAtThem) {
+TEST(MotionTestSlow, StaggeredCamerasSeeBetweenTheirInstantsAsWellAsAtThem) {
   Effects moving = absorbing(PerMeter(32.8));
   Effects still = moving;
   moving.motion = rising(1);
@@ -85,7 +85,7 @@ TEST(MotionTest, StaggeredCamerasSeeBetweenTheirInstantsAsWellAsAtThem) {
   EXPECT_LT(between, 0.7 * unaware) << "pictures of other instants as if they were of this one";
 }
 
-TEST(MotionTest, APictureOfAFlameThatHasLeftTheBoxIsRefused) {
+TEST(MotionTestSlow, APictureOfAFlameThatHasLeftTheBoxIsRefused) {
   Scene scene;
   scene.box.size = Eigen::Vector3d(0.1, 0.1, 0.3);
   for (const double late : {0.0, 0.02, -0.02}) {
@@ -100,7 +100,7 @@ TEST(MotionTest, APictureOfAFlameThatHasLeftTheBoxIsRefused) {
   EXPECT_TRUE(check_carried(scene, rising(100)).ok());
 }
 
-TEST(MotionTest, AMovedCameraSeesTheCarriedPointWhereItsOwnSawItLate) {
+TEST(MotionTestSlow, AMovedCameraSeesTheCarriedPointWhereItsOwnSawItLate) {
   View view;
   view.camera =
       look_at({{64, 48}, 80, 80, 32, 24, {0.1, -0.02, 0.001, 0.002, 0}}, {0.3, 0.1, 0.05}, {0, 0, 0});
@@ -112,7 +112,7 @@ TEST(MotionTest, AMovedCameraSeesTheCarriedPointWhereItsOwnSawItLate) {
             1e-9);
 }
 
-TEST(MotionTest, APictureOfThePlaneThroughTheFlameChangesPlaceAsTheCameraDoes) {
+TEST(MotionTestSlow, APictureOfThePlaneThroughTheFlameChangesPlaceAsTheCameraDoes) {
   // A smooth spot in the plane across the axis, seen from both places.
   View view;
   view.camera = look_at({{64, 48}, 80, 80, 32, 24, {}}, {0, -0.4, 0}, {0, 0, 0});
@@ -136,7 +136,7 @@ TEST(MotionTest, APictureOfThePlaneThroughTheFlameChangesPlaceAsTheCameraDoes) {
   for (std::size_t i = 0; i < own.rgb.size(); ++i) EXPECT_NEAR(change.rgb[i], own.rgb[i] - moved.rgb[i], 0.6);
 }
 
-TEST(MotionTest, AViewFromAnotherInstantIsRenderedAtItsOwn) {
+TEST(MotionTestSlow, AViewFromAnotherInstantIsRenderedAtItsOwn) {
   const Scene& scene = rising_scene();
   const EffectChoice choice = chosen(scene);
   ASSERT_TRUE(choice.reports.back().on) << choice.reports.back().reason;
@@ -148,7 +148,7 @@ TEST(MotionTest, AViewFromAnotherInstantIsRenderedAtItsOwn) {
   EXPECT_LT(corrected, 0.8 * heldout(scene, still));
 }
 
-TEST(MotionTest, AFlameThatStandsStillAndOneFilmedAtOnceAreLeftAlone) {
+TEST(MotionTestSlow, AFlameThatStandsStillAndOneFilmedAtOnceAreLeftAlone) {
   const EffectChoice standing = chosen(late_scene(0));
   EXPECT_FALSE(standing.reports.back().on) << standing.reports.back().reason;
   EXPECT_EQ(standing.effects.motion.carry, Motion::Carry::none);
@@ -164,14 +164,14 @@ TEST(MotionTest, AFlameThatStandsStillAndOneFilmedAtOnceAreLeftAlone) {
       << "nothing is copied where no view is late";
 }
 
-TEST(MotionTest, TimesThatAreAsUncertainAsTheyDifferAreNotUsed) {
+TEST(MotionTestSlow, TimesThatAreAsUncertainAsTheyDifferAreNotUsed) {
   Scene scene = rising_scene();
   for (View& view : scene.views) view.lateness_sigma = Seconds(kReach);
   const EffectChoice choice = chosen(scene);
   EXPECT_FALSE(choice.reports.back().on) << choice.reports.back().reason;
 }
 
-TEST(MotionTest, WhatIsSetByHandIsTaken) {
+TEST(MotionTestSlow, WhatIsSetByHandIsTaken) {
   const auto request = parse_effects("extinction=32.8,motion=0.8");
   ASSERT_TRUE(request.ok());
   EXPECT_EQ(request->fixed->motion.velocity, (std::array<double, 3>{0, 0, 0.8}));
@@ -188,7 +188,7 @@ TEST(MotionTest, WhatIsSetByHandIsTaken) {
 
 /// A held-out view that is late too is rendered at its own instant: what is taken out of its picture is put
 /// into the render.
-TEST(MotionTest, TheSteadyPartGoesBackIntoARenderOfALateView) {
+TEST(MotionTestSlow, TheSteadyPartGoesBackIntoARenderOfALateView) {
   const Scene& scene = rising_scene();
   Effects effects;
   effects.motion = rising(1);

@@ -131,7 +131,7 @@ Ratios over_repeated(const Noisy& s, double noise) {
 
 /// A found extinction isn't settled when the solve ends, so that repeated noise moves it, and the emission
 /// with it, more than the parabola's lowest point.
-TEST(NoiseErrorsTest, AreAboutWhatRepeatedNoiseDoes) {
+TEST(NoiseErrorsTestSlow, AreAboutWhatRepeatedNoiseDoes) {
   for (const Extinction::Model model : {Extinction::Model::none, Extinction::Model::field})
     for (const double noise : {0.25, 1.0, 4.0}) {
       const bool found = model == Extinction::Model::field;

@@ -17,6 +17,7 @@ namespace emberlock::recon {
 namespace {
 
 ON_EACH_DEVICE(PapersSolver);
+ON_EACH_DEVICE(PapersSolverSlow);
 using testing::Contains;
 using testing::HasSubstr;
 using testing::IsEmpty;
@@ -108,7 +109,7 @@ TEST_P(PapersSolver, FindsTheFlameBeforeABackground) {
   }
 }
 
-TEST_P(PapersSolver, ARunListsWhereItIsNotThePapers) {
+TEST_P(PapersSolverSlow, ARunListsWhereItIsNotThePapers) {
   ReconstructOptions options;
   options.voxels = 12;
   options.solve = papers_options(2);

@@ -13,7 +13,7 @@
 namespace emberlock::recon {
 namespace {
 
-ON_EACH_DEVICE(PrecisionTest);
+ON_EACH_DEVICE(PrecisionTestSlow);
 
 /// The largest difference of two lists over the largest value of the second, lanes 0..lanes - 1.
 double relative_difference(const std::vector<Rgba>& a, const Marches<double>::Values& b, int lanes) {
@@ -34,7 +34,7 @@ Marches<double>::Values widened(const std::vector<Rgba>& from) {
   return to;
 }
 
-TEST(Precision, PhiAndItsSlopeHoldTheirDigitsAtEveryDepth) {
+TEST(PrecisionSlow, PhiAndItsSlopeHoldTheirDigitsAtEveryDepth) {
   for (double x = 1e-12; x < 1e30; x *= 1.1) {
     const auto wide = static_cast<long double>(x);
     const long double phi_true = -std::expm1(-wide) / wide;
@@ -63,7 +63,7 @@ TEST(Precision, PhiAndItsSlopeHoldTheirDigitsAtEveryDepth) {
   EXPECT_EQ(phi_slope(0.0), -0.5);
 }
 
-TEST_P(PrecisionTest, MarchesDifferByAHundredThousandthOfTheBrightest) {
+TEST_P(PrecisionTestSlow, MarchesDifferByAHundredThousandthOfTheBrightest) {
   for (const bool curved : {false, true}) {
     const MarchCase c = march_case({.curved = curved});
     const auto narrow = marches_on<float>(device_here(), c.list);
@@ -85,7 +85,7 @@ TEST_P(PrecisionTest, MarchesDifferByAHundredThousandthOfTheBrightest) {
   }
 }
 
-TEST_P(PrecisionTest, TransmittanceIsRightToMillionthsHoweverThickTheMedium) {
+TEST_P(PrecisionTestSlow, TransmittanceIsRightToMillionthsHoweverThickTheMedium) {
   const MarchCase c = march_case();
   for (double sigma = 1e-6; sigma < 1e9; sigma *= 10) {
     const auto x = random_quads<float>(c.list.grid.size(), 1, 1, 2 * sigma);
@@ -96,7 +96,7 @@ TEST_P(PrecisionTest, TransmittanceIsRightToMillionthsHoweverThickTheMedium) {
   }
 }
 
-TEST_P(PrecisionTest, GradientsByEmissionAndExtinctionDifferByAHundredThousandthOfTheLargest) {
+TEST_P(PrecisionTestSlow, GradientsByEmissionAndExtinctionDifferByAHundredThousandthOfTheLargest) {
   const MarchCase c = march_case();
   const auto seen = random_quads<float>(c.list.rays.size(), 1, 2);
   const auto background = random_quads<float>(c.list.rays.size(), 2);
@@ -112,7 +112,7 @@ TEST_P(PrecisionTest, GradientsByEmissionAndExtinctionDifferByAHundredThousandth
   }
 }
 
-TEST_P(PrecisionTest, ReconstructionsDifferByLessThanAHundredthOfAGreyLevelOnTheHeldOutView) {
+TEST_P(PrecisionTestSlow, ReconstructionsDifferByLessThanAHundredthOfAGreyLevelOnTheHeldOutView) {
   const Scene scene = small_flame_scene();
   SolveOptions options;
   options.compute.device = device_here();

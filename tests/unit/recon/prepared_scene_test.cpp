@@ -48,16 +48,16 @@ int pictures_made(const Scene& scene, const std::optional<EffectRequest>& effect
   });
 }
 
-TEST(PreparedSceneTest, AReconstructionOfLinearPicturesMakesNoneButItsRenders) {
+TEST(PreparedSceneTestSlow, AReconstructionOfLinearPicturesMakesNoneButItsRenders) {
   EXPECT_EQ(pictures_made(scene_of_a_ball(), EffectRequest{Effects{}}), kViewsOfABall);
   EXPECT_EQ(pictures_made(scene_of_a_ball(), {}), kViewsOfABall) << "nor does the search for effects";
 }
 
-TEST(PreparedSceneTest, AReconstructionMakesPicturesLinearOnce) {
+TEST(PreparedSceneTestSlow, AReconstructionMakesPicturesLinearOnce) {
   EXPECT_EQ(pictures_made(scene_of_a_ball(), EffectRequest{a_gamma()}), 2 * kViewsOfABall);
 }
 
-TEST(PreparedSceneTest, ACameraThatIsPutRightCostsNoPictures) {
+TEST(PreparedSceneTestSlow, ACameraThatIsPutRightCostsNoPictures) {
   Scene scene = scene_of_a_ball();
   scene.views[2].camera.intrinsics.cy += 30;
   std::vector<std::string> warnings;
@@ -66,7 +66,7 @@ TEST(PreparedSceneTest, ACameraThatIsPutRightCostsNoPictures) {
 }
 
 // What is measured along the borders is light, as the background of a render is.
-TEST(PreparedSceneTest, AGreyBackgroundBehindAGammaIsKnownInLinearLevels) {
+TEST(PreparedSceneTestSlow, AGreyBackgroundBehindAGammaIsKnownInLinearLevels) {
   Scene scene = scene_of_a_ball();
   const Effects bent = a_gamma();
   for (View& view : scene.views) {
@@ -84,7 +84,7 @@ TEST(PreparedSceneTest, AGreyBackgroundBehindAGammaIsKnownInLinearLevels) {
   for (const double level : found.radiance) EXPECT_NEAR(level, 12, 0.5);
 }
 
-TEST(PreparedSceneTest, MasksAreFoundOnceForTheSamePicturesAndBackground) {
+TEST(PreparedSceneTestSlow, MasksAreFoundOnceForTheSamePicturesAndBackground) {
   const auto prepared = PreparedScene::create(scene_of_a_ball(), {});
   ASSERT_TRUE(prepared.ok());
   const SharedMasks masks = prepared->masks({}, {});
@@ -99,7 +99,7 @@ TEST(PreparedSceneTest, MasksAreFoundOnceForTheSamePicturesAndBackground) {
   EXPECT_EQ(prepared->masks({}, {}), masks);
 }
 
-TEST(PreparedSceneTest, WhatDoesNotChangeAPictureSharesIt) {
+TEST(PreparedSceneTestSlow, WhatDoesNotChangeAPictureSharesIt) {
   const Scene told = scene_of_a_ball();
   const auto prepared = PreparedScene::create(told, a_gamma());
   ASSERT_TRUE(prepared.ok());
@@ -121,7 +121,7 @@ TEST(PreparedSceneTest, WhatDoesNotChangeAPictureSharesIt) {
   EXPECT_EQ(turned.told().views[1].camera.intrinsics.cx, cameras[1].intrinsics.cx);
 }
 
-TEST(PreparedSceneTest, OnlyLateViewsWhoseAverageIsKnownGetOtherPictures) {
+TEST(PreparedSceneTestSlow, OnlyLateViewsWhoseAverageIsKnownGetOtherPictures) {
   Scene told = scene_of_a_ball();
   for (View& view : told.views) view.average = view.image;
   told.views[2].lateness = Seconds(0.004);
@@ -140,7 +140,7 @@ TEST(PreparedSceneTest, OnlyLateViewsWhoseAverageIsKnownGetOtherPictures) {
   EXPECT_EQ(prepared->under(moved).scene().views[2].image, views[2].image) << "done before";
 }
 
-TEST(PreparedSceneTest, ASceneThatNobodyCanUseIsNotPrepared) {
+TEST(PreparedSceneTestSlow, ASceneThatNobodyCanUseIsNotPrepared) {
   Scene scene = scene_of_a_ball();
   scene.views[4].image.reset();
   const auto prepared = PreparedScene::create(scene, {});

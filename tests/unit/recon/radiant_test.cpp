@@ -36,7 +36,7 @@ HotVolume ball(double radius, double kelvin, double absorption, int voxels = 48)
   return v;
 }
 
-TEST(Radiant, AnIsothermalBallRadiatesTheClosedForm) {
+TEST(RadiantSlow, AnIsothermalBallRadiatesTheClosedForm) {
   for (const double radius : {0.01, 0.1, 3.0})
     for (const double depth : {0.05, 0.5, 2.0}) {
       const double t = depth;
@@ -64,7 +64,7 @@ TEST(Radiant, FluxVeryFarAwayToo) {
   EXPECT_NEAR(radiant_flux(v, {60, 0, 80}, oblique), share * 1.4 / std::sqrt(2), 0.02 * share);
 }
 
-TEST(Radiant, ASphereAroundTheBallCatchesAllItsPower) {
+TEST(RadiantSlow, ASphereAroundTheBallCatchesAllItsPower) {
   const double depth = 0.5;
   const double share = 1 - (1 - (1 + 2 * depth) * std::exp(-2 * depth)) / (2 * depth * depth);
   const double power = 4 * kPi * 0.1 * 0.1 * kSigma * std::pow(1500, 4) * share;
@@ -91,7 +91,7 @@ TEST(Radiant, ASmallFarSphereGetsTheInverseSquareShare) {
   EXPECT_NEAR(flux.most, most, 0.03 * most) << "facing the flame";
 }
 
-TEST(Radiant, ASphereInsideAThickBodyIsLitOnItsOuterSide) {
+TEST(RadiantSlow, ASphereInsideAThickBodyIsLitOnItsOuterSide) {
   const SphereFlux flux = radiant_flux(ball(0.1, 1000, 1e4, 24), TargetSphere{{0, 0, 0}, 0.02});
   EXPECT_NEAR(flux.mean, kSigma * 1e12, 0.01 * kSigma * 1e12);
   EXPECT_NEAR(flux.most, flux.mean, 0.01 * flux.mean);

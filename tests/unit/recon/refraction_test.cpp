@@ -18,6 +18,7 @@ namespace emberlock::recon {
 namespace {
 
 ON_EACH_DEVICE(RefractionTest);
+ON_EACH_DEVICE(RefractionTestSlow);
 
 using Eigen::Vector3d;
 using Eigen::Vector3f;
@@ -280,7 +281,7 @@ Effects curved(PerMeter extinction) {
   return effects;
 }
 
-TEST_P(RefractionTest, CurvedPicturesAgreeWithBruteForceInDouble) {
+TEST_P(RefractionTestSlow, CurvedPicturesAgreeWithBruteForceInDouble) {
   const Setting setting;
   const GasTemperature gas = lens_gas();
   RenderOptions options;

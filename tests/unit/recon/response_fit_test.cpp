@@ -106,7 +106,7 @@ TEST(ResponseFit, TheResponseIsTheOnePredictedFrom) {
 }
 
 /// Cameras drawn from the priors: their true numbers lie within two stated errors as often as they should.
-TEST(ResponseFit, StatedErrorsHoldForOneTwoAndFourTemperatures) {
+TEST(ResponseFitSlow, StatedErrorsHoldForOneTwoAndFourTemperatures) {
   constexpr int kRepeats = 200;
   const std::vector<std::vector<double>> sets = {{1900}, {1500, 2600}, {1300, 1800, 2400, 3100}};
   for (const std::vector<double>& temperatures : sets) {

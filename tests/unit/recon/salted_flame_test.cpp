@@ -54,12 +54,13 @@ class SaltedFlameTest : public testing::Test {
   static const Reconstruction* done_;
   static const VolumeErrors* errors_;
 };
+using SaltedFlameTestSlow = SaltedFlameTest;
 const test::GlowingFlame* SaltedFlameTest::flame_ = nullptr;
 const Scene* SaltedFlameTest::scene_ = nullptr;
 const Reconstruction* SaltedFlameTest::done_ = nullptr;
 const VolumeErrors* SaltedFlameTest::errors_ = nullptr;
 
-TEST_F(SaltedFlameTest, ItsTemperaturesAreToldWithTheLinesNamed) {
+TEST_F(SaltedFlameTestSlow, ItsTemperaturesAreToldWithTheLinesNamed) {
   const TemperatureField alone = read("");
   const TemperatureField unmixed = read("sodium,c2");
   const test::TemperatureScore before = test::score_of(*flame_, *done_, alone);
@@ -77,7 +78,7 @@ TEST_F(SaltedFlameTest, ItsTemperaturesAreToldWithTheLinesNamed) {
   EXPECT_THAT(words(unmixed), HasSubstr("sodium makes"));
 }
 
-TEST_F(SaltedFlameTest, SharesAreWhereTheLinesAre) {
+TEST_F(SaltedFlameTestSlow, SharesAreWhereTheLinesAre) {
   const TemperatureField field = read("sodium,c2");
   ASSERT_EQ(field.summary.lines.size(), 2U);
   const Grid& grid = done_->volume.grid;
@@ -111,7 +112,7 @@ TEST_F(SaltedFlameTest, SharesAreWhereTheLinesAre) {
   EXPECT_LT(told_in_base / n[2], 0.02) << "there is no soot";
 }
 
-TEST_F(SaltedFlameTest, AutoNamesTheOneThatExplainsMost) {
+TEST_F(SaltedFlameTestSlow, AutoNamesTheOneThatExplainsMost) {
   const TemperatureField field = read("auto");
   SCOPED_TRACE(words(field));
   EXPECT_TRUE(field.summary.lines_automatic);

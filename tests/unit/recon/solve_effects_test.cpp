@@ -15,7 +15,7 @@
 namespace emberlock::recon {
 namespace {
 
-ON_EACH_DEVICE(SolveEffects);
+ON_EACH_DEVICE(SolveEffectsSlow);
 
 constexpr PerMeter kExtinction{32.8};
 
@@ -51,7 +51,7 @@ double undisturbed() {
   return error;
 }
 
-TEST_P(SolveEffects, AnEvenBackgroundIsSeenThroughTheFlame) {
+TEST_P(SolveEffectsSlow, AnEvenBackgroundIsSeenThroughTheFlame) {
   Effects effects;
   effects.background = {Background::Kind::constant, {60, 50, 40}};
   const Scene scene = filmed(effects);
@@ -60,7 +60,7 @@ TEST_P(SolveEffects, AnEvenBackgroundIsSeenThroughTheFlame) {
   EXPECT_GT(heldout(scene, {}), 2 * known);
 }
 
-TEST_P(SolveEffects, APictureOfTheBackgroundIsSeenThroughTheFlame) {
+TEST_P(SolveEffectsSlow, APictureOfTheBackgroundIsSeenThroughTheFlame) {
   RadianceImage wall({160, 120});
   for (std::size_t i = 0; i < wall.rgb.size(); ++i) wall.rgb[i] = 20 + 0.4F * static_cast<float>(i / 3 % 160);
   Effects effects;
@@ -71,7 +71,7 @@ TEST_P(SolveEffects, APictureOfTheBackgroundIsSeenThroughTheFlame) {
   EXPECT_GT(heldout(scene, {}), 2 * known);
 }
 
-TEST_P(SolveEffects, GammaCodedPicturesAreMadeLinear) {
+TEST_P(SolveEffectsSlow, GammaCodedPicturesAreMadeLinear) {
   Effects effects;
   effects.sensor.response = Sensor::Response::gamma;
   effects.sensor.gamma = 2.2;
@@ -81,7 +81,7 @@ TEST_P(SolveEffects, GammaCodedPicturesAreMadeLinear) {
   EXPECT_GT(heldout(scene, {}), 1.3 * known);
 }
 
-TEST_P(SolveEffects, SaturatedPixelsBoundTheLightFromBelow) {
+TEST_P(SolveEffectsSlow, SaturatedPixelsBoundTheLightFromBelow) {
   Effects effects;
   effects.sensor.clipping = Sensor::Clipping::at_white;
   effects.sensor.white = 120;
@@ -93,7 +93,7 @@ TEST_P(SolveEffects, SaturatedPixelsBoundTheLightFromBelow) {
 }
 
 /// After gains, each view's white lies elsewhere, and one view's white is another's unsaturated light.
-TEST_P(SolveEffects, EachViewsOwnSaturatedPixelsBoundTheLight) {
+TEST_P(SolveEffectsSlow, EachViewsOwnSaturatedPixelsBoundTheLight) {
   Scene scene = filmed({});
   for (std::size_t v = 0; v + 1 < scene.views.size(); ++v) {
     View& view = scene.views[v];
@@ -113,7 +113,7 @@ TEST_P(SolveEffects, EachViewsOwnSaturatedPixelsBoundTheLight) {
   EXPECT_LT(as_bounds, 0.8 * heldout(scene, {}));
 }
 
-TEST_P(SolveEffects, ARisingFlameIsSharpenedAgain) {
+TEST_P(SolveEffectsSlow, ARisingFlameIsSharpenedAgain) {
   Effects effects;
   effects.exposure = {Exposure::Shutter::integrated, Seconds(0.012), 1.0};
   const Scene scene = filmed(effects);
@@ -135,14 +135,14 @@ TEST_P(SolveEffects, ARisingFlameIsSharpenedAgain) {
   EXPECT_LT(sharp, 0.95 * blurred);
 }
 
-TEST_P(SolveEffects, CurvedRaysOfAFlameGiveTheSameVolumeAsStraightOnes) {
+TEST_P(SolveEffectsSlow, CurvedRaysOfAFlameGiveTheSameVolumeAsStraightOnes) {
   const Scene scene = filmed({});
   Effects effects;
   effects.refraction.rays = Refraction::Rays::curved;
   EXPECT_NEAR(heldout(scene, effects), undisturbed(), 0.15);  // 1800 K bend rays by a hundredth of a voxel
 }
 
-TEST_P(SolveEffects, LightThatTheMediumScattersIsTakenOutOfTheEmission) {
+TEST_P(SolveEffectsSlow, LightThatTheMediumScattersIsTakenOutOfTheEmission) {
   Effects effects;
   effects.extinction = constant_extinction(kExtinction);
   effects.scattering = {Scattering::Order::multiple, 0.6, 0};
@@ -167,7 +167,7 @@ TEST_P(SolveEffects, LightThatTheMediumScattersIsTakenOutOfTheEmission) {
   EXPECT_GT(without, 2 * again);
 }
 
-TEST_P(SolveEffects, LightScatteredForwardsIsToldFromLightThatShinesEvenly) {
+TEST_P(SolveEffectsSlow, LightScatteredForwardsIsToldFromLightThatShinesEvenly) {
   Effects effects;
   effects.scattering = {Scattering::Order::single, 0.8, 0.8};
   const Scene scene = filmed(effects);
@@ -185,7 +185,7 @@ TEST_P(SolveEffects, LightScatteredForwardsIsToldFromLightThatShinesEvenly) {
   EXPECT_LT(error(0.8), error(0));
 }
 
-TEST_P(SolveEffects, ThePapersSolverRefusesWhatItDoesNotKnow) {
+TEST_P(SolveEffectsSlow, ThePapersSolverRefusesWhatItDoesNotKnow) {
   const Scene scene = filmed({});
   SolveOptions options;
   options.solver = Solver::paper;

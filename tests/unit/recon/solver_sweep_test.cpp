@@ -12,7 +12,7 @@
 namespace emberlock::recon {
 namespace {
 
-ON_EACH_DEVICE(SolverSweep);
+ON_EACH_DEVICE(SolverSweepSlow);
 
 /// Of the error of no light. Two views don't tell what a third sees, and 30 of the paper's iterations are
 /// few.
@@ -21,7 +21,7 @@ double most_left(const SweepCase& c) {
   return c.ball.noise > 0 ? 0.6 : 0.3;
 }
 
-TEST_P(SolverSweep, FindsTheBallOrSaysWhyNot) {
+TEST_P(SolverSweepSlow, FindsTheBallOrSaysWhyNot) {
   constexpr int kCases = 40;
   for (int n = 0; n < kCases; ++n) {
     const SweepCase c = sweep_case(n, {.widest = 160, .most_voxels = 48});
@@ -35,7 +35,7 @@ TEST_P(SolverSweep, FindsTheBallOrSaysWhyNot) {
 
 /// Grids of 24 voxels, and those that pass through 24 on the way, ended with millions of grey levels: key
 /// points that the sampled quarter of the pixels saw little of were stepped too far.
-TEST_P(SolverSweep, EvenRingsOfTheBallConvergeAtAnyResolution) {
+TEST_P(SolverSweepSlow, EvenRingsOfTheBallConvergeAtAnyResolution) {
   for (const double height : {0.0, 10.0})
     for (const int voxels : {24, 44, 48, 52, 96}) {
       SCOPED_TRACE(fmt::format("{} voxels, cameras {} degrees high", voxels, height));
@@ -53,7 +53,7 @@ TEST_P(SolverSweep, EvenRingsOfTheBallConvergeAtAnyResolution) {
 }
 
 /// alpha_l isn't normalised by the number of views: with 28 the paper's own steps let the error grow.
-TEST_P(SolverSweep, ThePapersSolverWithManyViewsIsTakenBackInsteadOfGrowing) {
+TEST_P(SolverSweepSlow, ThePapersSolverWithManyViewsIsTakenBackInsteadOfGrowing) {
   BallOptions ball;
   ball.views = 28;
   ball.height = 60;

@@ -55,7 +55,7 @@ const Solved& solved_of(Emitter emitter) {
   return emitter == Emitter::grey ? grey : soot;
 }
 
-TEST(Temperature, IsReadToATwentiethOfItsRangeAndItsErrorsHold) {
+TEST(TemperatureSlow, IsReadToATwentiethOfItsRangeAndItsErrorsHold) {
   for (const Emitter emitter : {Emitter::grey, Emitter::soot}) {
     const test::GlowingFlame& flame = flame_of(emitter);
     const Solved& s = solved_of(emitter);
@@ -93,7 +93,7 @@ double between_renderers(Emitter emitter, int truth_voxels) {
   return std::sqrt(squares / static_cast<double>(values));
 }
 
-TEST(Temperature, ItsPicturesAreThoseOfAnotherRenderer) {
+TEST(TemperatureSlow, ItsPicturesAreThoseOfAnotherRenderer) {
   const double coarse = between_renderers(Emitter::grey, 64);
   const double fine = between_renderers(Emitter::grey, 128);
   EXPECT_LT(fine, 0.6) << "of 230 levels";
@@ -101,7 +101,7 @@ TEST(Temperature, ItsPicturesAreThoseOfAnotherRenderer) {
   EXPECT_LT(between_renderers(Emitter::soot, 128), 0.7) << "a channel's absorption is one, or many";
 }
 
-TEST(Temperature, OfNoisyPicturesIsBetterSolvedTogetherThanReadVoxelByVoxel) {
+TEST(TemperatureSlow, OfNoisyPicturesIsBetterSolvedTogetherThanReadVoxelByVoxel) {
   test::GlowingFlameOptions noisy = small_flame(Emitter::grey);
   noisy.noise = 1;
   noisy.levels = 255;
@@ -126,7 +126,7 @@ TEST(Temperature, OfNoisyPicturesIsBetterSolvedTogetherThanReadVoxelByVoxel) {
   }
 }
 
-TEST(Temperature, OfGoodPicturesIsLeftAsItWasReadWhereLeftOutViewsSpeakAgainstTheRest) {
+TEST(TemperatureSlow, OfGoodPicturesIsLeftAsItWasReadWhereLeftOutViewsSpeakAgainstTheRest) {
   const test::GlowingFlame& flame = flame_of(Emitter::grey);
   const Solved& s = solved_of(Emitter::grey);
   const TemperatureField field = temperature_of(s.scene, s.done, s.errors, flame.response(), Emitter::grey);
@@ -145,7 +145,7 @@ TEST(Temperature, OfGoodPicturesIsLeftAsItWasReadWhereLeftOutViewsSpeakAgainstTh
       << "they were right";
 }
 
-TEST(Temperature, NotKnowingWhatGlowsIsPartOfEachError) {
+TEST(TemperatureSlow, NotKnowingWhatGlowsIsPartOfEachError) {
   const test::GlowingFlame& flame = flame_of(Emitter::soot);
   const Solved& s = solved_of(Emitter::soot);
   const TemperatureField told = temperature_of(s.scene, s.done, s.errors, flame.response(), Emitter::grey);
@@ -160,7 +160,7 @@ TEST(Temperature, NotKnowingWhatGlowsIsPartOfEachError) {
   EXPECT_GT(untold.summary.sigma, 0.8 * std::abs(untold.summary.mean - untold.summary.if_other));
 }
 
-TEST(Temperature, AJointSolveThatIsStoppedKeepsWhatItHas) {
+TEST(TemperatureSlow, AJointSolveThatIsStoppedKeepsWhatItHas) {
   const test::GlowingFlame& flame = flame_of(Emitter::grey);
   const Solved& s = solved_of(Emitter::grey);
   SolveOptions options;
@@ -174,7 +174,7 @@ TEST(Temperature, AJointSolveThatIsStoppedKeepsWhatItHas) {
   EXPECT_EQ(field.kelvin, alone.kelvin);
 }
 
-TEST(Temperature, SaysWhatAnotherEmitterWouldMakeOfIt) {
+TEST(TemperatureSlow, SaysWhatAnotherEmitterWouldMakeOfIt) {
   const test::GlowingFlame& flame = flame_of(Emitter::soot);
   const Solved& s = solved_of(Emitter::soot);
   const TemperatureSummary told =
@@ -187,7 +187,7 @@ TEST(Temperature, SaysWhatAnotherEmitterWouldMakeOfIt) {
   EXPECT_NEAR(told.if_other, mistaken.mean, kMoved);
 }
 
-TEST(Temperature, ThePapersConventionReadsGreenAlone) {
+TEST(TemperatureSlow, ThePapersConventionReadsGreenAlone) {
   const test::GlowingFlame& flame = flame_of(Emitter::grey);
   const Solved& s = solved_of(Emitter::grey);
   const TemperatureField field = temperature_of(s.scene, s.done, s.errors, flame.response(), Emitter::paper);
@@ -200,7 +200,7 @@ TEST(Temperature, ThePapersConventionReadsGreenAlone) {
   EXPECT_EQ(scaled.summary.chi_square, 0) << "nothing is left to contradict it";
 }
 
-TEST(Temperature, SaturatedCoresAreBoundsAndBlackPicturesTellNothing) {
+TEST(TemperatureSlow, SaturatedCoresAreBoundsAndBlackPicturesTellNothing) {
   const test::GlowingFlame& flame = flame_of(Emitter::grey);
   Solved s = solved_of(Emitter::grey);
   const TemperatureCounts before =

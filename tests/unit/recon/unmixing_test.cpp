@@ -45,6 +45,7 @@ class UnmixingTest : public testing::Test {
     return {meter_, shown};
   }
 };
+using UnmixingTestSlow = UnmixingTest;
 
 TEST_F(UnmixingTest, AMixtureComesApartIntoWhatItIsMadeOf) {
   for (const char* line : {"sodium", "c2", "cuoh", "bo2", "ch", "cucl", "lithium"})
@@ -75,7 +76,7 @@ TEST_F(UnmixingTest, MixturesThatLookAlikeAreNoTemperature) {
   EXPECT_LT(told.sigma, 100);
 }
 
-TEST_F(UnmixingTest, ErrorsHoldHoweverMuchOfTheLightIsTheLines) {
+TEST_F(UnmixingTestSlow, ErrorsHoldHoweverMuchOfTheLightIsTheLines) {
   for (const char* line : {"sodium", "c2"})
     for (const double share : {0.0, 0.02, 0.05, 0.1, 0.3, 0.7}) {
       const Eigen::Vector3d level = mixture(response_, 1800, line, share);

@@ -17,6 +17,7 @@ namespace emberlock::recon {
 namespace {
 
 ON_EACH_DEVICE(VoxelChoiceTest);
+ON_EACH_DEVICE(VoxelChoiceTestSlow);
 using testing::Contains;
 using testing::HasSubstr;
 
@@ -148,7 +149,7 @@ TEST_P(VoxelChoiceTest, AMachineTenTimesAsSlowIsMeasuredAsTenTimesAsSlow) {
   EXPECT_NEAR(unit(2) / slow, 10, 1e-6) << "no solve is cut short";
 }
 
-TEST_P(VoxelChoiceTest, APlanSearchesForTheEffectsAsTheRunDoesAndScalesWithTheMachine) {
+TEST_P(VoxelChoiceTestSlow, APlanSearchesForTheEffectsAsTheRunDoesAndScalesWithTheMachine) {
   const std::function<void(const Preview&)> nobody;
   ReconstructOptions options;
   options.solve.compute = {device_here(), 2};
@@ -210,7 +211,7 @@ TEST_P(VoxelChoiceTest, ErrorsNeedMoreMemoryThanTheSolve) {
   EXPECT_NEAR(over_the_solve(options), (kSolve + 15 * 4 + 18) / kSolve, 0.05) << "and what noise does";
 }
 
-TEST_P(VoxelChoiceTest, SaysWhatTheNextStepWouldBuyAndCost) {
+TEST_P(VoxelChoiceTestSlow, SaysWhatTheNextStepWouldBuyAndCost) {
   for (const double tick : {1e-5, 1e-4, 1e-3, 1e-2}) {
     const VoxelChoice choice = planned(tick);
     ASSERT_EQ(choice.words.size(), 2U);

@@ -138,7 +138,7 @@ Result<report::ViewerProgram> viewer_program() {
       if (script && style) return report::ViewerProgram{*script, *style};
     }
   return Error{ErrorKind::io, "the viewer isn't built or installed", program.string(),
-               "Build the target `console`, which needs node and npm"};
+               "Install node and npm, and build it again"};
 }
 
 Result<std::string> viewer_html(const fs::path& result, const std::vector<ResultVolume>& volumes,

@@ -172,27 +172,27 @@ void align(const AlignArguments& arguments) {
       arguments.json ? rig::summary_json(*result, seed).dump() + "\n" : align_summary(*result);
   std::printf("%s", summary.c_str());
   if (stopped) say_kept(arguments, *result);
-  if (result->last.verdict != smear::AlignVerdict::aligned) throw CLI::RuntimeError(1);
+  if (result->last.verdict != smear::AlignVerdict::aligned) throw Exit(1);
 }
 
 /// The options that the daemon accepts; the others are in its configuration.
-DaemonAlignment asked_of_daemon(const AlignArguments& arguments, const CLI::App& verb) {
+DaemonAlignment asked_of_daemon(const AlignArguments& arguments, const Verb& verb) {
   static const std::set<std::string> kAskable = {"--tolerance", "--flame-speed", "--detail", "--policy",
                                                  "--anyway",    "--renew",       "--stop",   "--json",
                                                  "--verbose",   "--stagger"};
-  for (const CLI::Option* option : verb.get_options()) {
-    if (option->count() > 0 && !is_daemon_option(*option) && kAskable.count(option->get_name()) == 0) {
-      fail({ErrorKind::bad_input, "works only together with --rig", option->get_name(),
+  for (const Option& option : verb.given_options()) {
+    if (!is_daemon_option(option) && kAskable.count(option.name()) == 0) {
+      fail({ErrorKind::bad_input, "works only together with --rig", option.name(),
             "Give --rig too, or leave it to the daemon's configuration"});
     }
   }
   DaemonAlignment wanted = arguments.by_daemon;
   wanted.json = arguments.json;
   wanted.detail = arguments.detail;
-  if (verb.count("--tolerance") > 0) wanted.request.set_tolerance(arguments.tolerance);
-  if (verb.count("--flame-speed") > 0) wanted.request.set_flame_speed_m_s(arguments.flame_speed);
-  if (verb.count("--detail") > 0) wanted.request.set_detail_m(1e-3 * arguments.detail_mm);
-  if (verb.count("--policy") > 0) wanted.request.set_policy(arguments.policy);
+  if (verb.is_given("--tolerance")) wanted.request.set_tolerance(arguments.tolerance);
+  if (verb.is_given("--flame-speed")) wanted.request.set_flame_speed_m_s(arguments.flame_speed);
+  if (verb.is_given("--detail")) wanted.request.set_detail_m(1e-3 * arguments.detail_mm);
+  if (verb.is_given("--policy")) wanted.request.set_policy(arguments.policy);
   if (arguments.stagger) wanted.request.set_stagger(true);
   wanted.request.set_anyway(arguments.anyway);
   wanted.request.set_renew(wanted.renew_for.has_value());
@@ -201,120 +201,120 @@ DaemonAlignment asked_of_daemon(const AlignArguments& arguments, const CLI::App&
 }
 
 /// Adds the options that say to what, how near and for how long.
-void add_tolerance(CLI::App* verb, AlignArguments& a) {
-  auto* tolerance = verb->add_option(
+void add_tolerance(const Verb& verb, AlignArguments& a) {
+  const Option tolerance = verb.add_option(
       "--tolerance", a.tolerance,
       "largest distance of a camera from the common target, to either side: 0.5ms, 500us or 10rows [the time "
       "in which the flame moves by a quarter of --detail]");
-  verb->add_option("--flame-speed", a.flame_speed, "speed of what moves fastest in the flame, m/s")
-      ->check(CLI::Range(0.001, 10000.0))
-      ->excludes(tolerance)
-      ->capture_default_str();
-  verb->add_option("--detail", a.detail_mm, "size of the smallest detail that shall be resolved, mm")
-      ->check(CLI::Range(0.001, 10000.0))
-      ->excludes(tolerance)
-      ->capture_default_str();
-  verb->add_option(
+  verb.add_option("--flame-speed", a.flame_speed, "speed of what moves fastest in the flame, m/s")
+      .check_range(0.001, 10000.0)
+      .exclude(tolerance)
+      .show_default();
+  verb.add_option("--detail", a.detail_mm, "size of the smallest detail that shall be resolved, mm")
+      .check_range(0.001, 10000.0)
+      .exclude(tolerance)
+      .show_default();
+  verb.add_option(
           "--shortest-take", a.shortest_take,
           "aligned means: surely for so many seconds, as far as measured drifts and resets can make it")
-      ->check(CLI::Range(0.0, 3600.0))
-      ->capture_default_str();
-  verb->add_flag("--stagger", a.stagger,
-                 "each camera to its own instant, spread evenly over the frame period: eleven cameras of 24 "
-                 "frames/s then see 264 instants a second (docs/staggered.md). Cameras in the order in which "
-                 "they stand around the flame");
+      .check_range(0.0, 3600.0)
+      .show_default();
+  verb.add_flag("--stagger", a.stagger,
+                "each camera to its own instant, spread evenly over the frame period: eleven cameras of 24 "
+                "frames/s then see 264 instants a second (docs/staggered.md). Cameras in the order in which "
+                "they stand around the flame");
 }
 
 /// Adds the options that limit an alignment.
-void add_limits(CLI::App* verb, AlignArguments& a) {
-  verb->add_option("--max-rounds", a.max_rounds, "give up after so many rounds")
-      ->check(CLI::Range(1, 1000000))
-      ->capture_default_str();
-  verb->add_option("--max-resets", a.max_resets,
-                   "refuse a tolerance that would take more resets, and say which one can be met")
-      ->check(CLI::Range(1, 1000000))
-      ->capture_default_str();
-  verb->add_option("--max-minutes", a.max_minutes, "refuse a tolerance that would take longer")
-      ->check(CLI::Range(0.01, 1e6))
-      ->capture_default_str();
-  verb->add_option("--probability", a.probability,
-                   "probability with which the alignment must stay within these limits")
-      ->check(CLI::Range(0.01, 1.0))
-      ->capture_default_str();
-  verb->add_option("--reset-seconds", a.reset_seconds,
-                   "time that an operator needs for one reset by hand; the forecast uses it")
-      ->check(CLI::Range(0.0, 3600.0))
-      ->capture_default_str();
+void add_limits(const Verb& verb, AlignArguments& a) {
+  verb.add_option("--max-rounds", a.max_rounds, "give up after so many rounds")
+      .check_range(1, 1000000)
+      .show_default();
+  verb.add_option("--max-resets", a.max_resets,
+                  "refuse a tolerance that would take more resets, and say which one can be met")
+      .check_range(1, 1000000)
+      .show_default();
+  verb.add_option("--max-minutes", a.max_minutes, "refuse a tolerance that would take longer")
+      .check_range(0.01, 1e6)
+      .show_default();
+  verb.add_option("--probability", a.probability,
+                  "probability with which the alignment must stay within these limits")
+      .check_range(0.01, 1.0)
+      .show_default();
+  verb.add_option("--reset-seconds", a.reset_seconds,
+                  "time that an operator needs for one reset by hand; the forecast uses it")
+      .check_range(0.0, 3600.0)
+      .show_default();
 }
 
 }  // namespace
 
-void add_align(CLI::App& app) {
+void add_align(const Verb& app) {
   auto arguments = std::make_shared<AlignArguments>();
-  CLI::App* verb =
-      app.add_subcommand("align",
-                         "Films the strobe and resets the cameras' shutters until all are within a tolerance "
-                         "of one another. The daemon does it; with --rig this program does.");
-  CLI::Option* rig =
-      verb->add_option("--rig", arguments->rig,
-                       "cameras and strobe: virtual:N, or virtual:4ccd+3rolling+2global [the daemon's]");
-  verb->add_option(
+  const Verb verb =
+      app.add_verb("align",
+                   "Films the strobe and resets the cameras' shutters until all are within a tolerance "
+                   "of one another. The daemon does it; with --rig this program does.");
+  const Option rig =
+      verb.add_option("--rig", arguments->rig,
+                      "cameras and strobe: virtual:N, or virtual:4ccd+3rolling+2global [the daemon's]");
+  verb.add_option(
           "--strobe", arguments->strobe,
           "the rig's strobe. virtual: simulated, set by the program. manual or manual:step=1: somebody sets "
           "it with a dial in such steps, flashes per minute; the program says what to set, measures from the "
           "frames what was set, and says which way to turn. virtual-dial:error=300,at=1510.5: a simulated "
           "dial, wrong by so many ppm, first set to `at`, and turned as the program says")
-      ->needs(rig)
-      ->capture_default_str();
+      .need(rig)
+      .show_default();
   add_tolerance(verb, *arguments);
-  verb->add_option("--policy", arguments->policy, "fixed-reference (the paper's), densest, timed or trimmed")
-      ->capture_default_str();
-  verb->add_option("--seed", arguments->seed, "seed of the virtual rig and of the moments of untimed resets")
-      ->capture_default_str();
-  verb->add_flag("--json", arguments->json, "one JSON object per round on stdout, and one at the end");
-  verb->add_flag_callback(
+  verb.add_option("--policy", arguments->policy, "fixed-reference (the paper's), densest, timed or trimmed")
+      .show_default();
+  verb.add_option("--seed", arguments->seed, "seed of the virtual rig and of the moments of untimed resets")
+      .show_default();
+  verb.add_flag("--json", arguments->json, "one JSON object per round on stdout, and one at the end");
+  verb.add_flag_function(
       "--verbose", [arguments] { arguments->detail = AlignDetail::all; },
       "print every camera of every round, not what changes alone");
-  verb->add_option("--latency-jitter", arguments->latency_jitter_ms, "RMS jitter of a reset's latency, ms")
-      ->check(CLI::Range(0.0, 1000.0))
-      ->capture_default_str();
+  verb.add_option("--latency-jitter", arguments->latency_jitter_ms, "RMS jitter of a reset's latency, ms")
+      .check_range(0.0, 1000.0)
+      .show_default();
   add_limits(verb, *arguments);
-  verb->add_option("--trim-range", arguments->trim_range_ppm,
-                   "how far virtual cameras can trim their frame rates, ppm; 0: they can't")
-      ->check(CLI::Range(0.0, 1000.0))
-      ->capture_default_str();
-  verb->add_option("--trim-step", arguments->trim_step_ppm, "step of these trims, ppm")
-      ->check(CLI::Range(0.001, 1000.0))
-      ->capture_default_str();
-  verb->add_option(
+  verb.add_option("--trim-range", arguments->trim_range_ppm,
+                  "how far virtual cameras can trim their frame rates, ppm; 0: they can't")
+      .check_range(0.0, 1000.0)
+      .show_default();
+  verb.add_option("--trim-step", arguments->trim_step_ppm, "step of these trims, ppm")
+      .check_range(0.001, 1000.0)
+      .show_default();
+  verb.add_option(
       "--delays", arguments->delays,
       "file with the measured reset delays of the cameras: read if it exists, written at the end");
-  verb->add_option("--hold", arguments->hold_minutes,
-                   "once aligned: check again whenever it is due and reset cameras that drifted out, for so "
-                   "many minutes or until Ctrl-C")
-      ->expected(0, 1)
-      ->default_str("1e9")
-      ->type_name("MINUTES")
-      ->check(CLI::PositiveNumber);
-  auto* record = verb->add_option("--record", arguments->record,
-                                  "record frames, strobe, resets and decisions to this folder");
-  verb->add_option("--replay", arguments->replay,
-                   "instead of filming, run a recorded alignment again, with its own settings")
-      ->excludes(record);
-  add_daemon_options(*verb, arguments->by_daemon.daemon);
-  verb->add_flag("--anyway", arguments->anyway,
-                 "daemon only: align even if the configured limits of time and resets can't be met")
-      ->excludes(rig);
-  verb->add_option("--renew", arguments->by_daemon.renew_for,
-                   "daemon only: go on from the lock, and reset cameras so that it holds for so many seconds")
-      ->type_name("SECONDS")
-      ->check(CLI::PositiveNumber)
-      ->excludes(rig);
-  verb->add_flag("--stop", arguments->by_daemon.stop, "daemon only: stop aligning, or release the lock")
-      ->excludes(rig);
-  verb->callback([arguments, verb] {
+  verb.add_option("--hold", arguments->hold_minutes,
+                  "once aligned: check again whenever it is due and reset cameras that drifted out, for so "
+                  "many minutes or until Ctrl-C")
+      .make_value_optional()
+      .set_default_text("1e9")
+      .set_type("MINUTES")
+      .check_positive();
+  const Option record = verb.add_option("--record", arguments->record,
+                                        "record frames, strobe, resets and decisions to this folder");
+  verb.add_option("--replay", arguments->replay,
+                  "instead of filming, run a recorded alignment again, with its own settings")
+      .exclude(record);
+  add_daemon_options(verb, arguments->by_daemon.daemon);
+  verb.add_flag("--anyway", arguments->anyway,
+                "daemon only: align even if the configured limits of time and resets can't be met")
+      .exclude(rig);
+  verb.add_option("--renew", arguments->by_daemon.renew_for,
+                  "daemon only: go on from the lock, and reset cameras so that it holds for so many seconds")
+      .set_type("SECONDS")
+      .check_positive()
+      .exclude(rig);
+  verb.add_flag("--stop", arguments->by_daemon.stop, "daemon only: stop aligning, or release the lock")
+      .exclude(rig);
+  verb.set_action([arguments, verb] {
     if (!asks_daemon(*arguments)) return align(*arguments);
-    align_by_daemon(asked_of_daemon(*arguments, *verb));
+    align_by_daemon(asked_of_daemon(*arguments, verb));
   });
 }
 

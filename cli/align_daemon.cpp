@@ -96,12 +96,12 @@ void align_by_daemon(const DaemonAlignment& wanted) {
                                        Interrupt::asked));
   if (Interrupt::asked()) {
     std::fprintf(stderr, "the daemon goes on; `emberlock align --stop` ends it\n");
-    throw CLI::RuntimeError(1);
+    throw Exit(1);
   }
   if (!follower.last()) leave(client, {ErrorKind::io, "the daemon ended before it aligned"});
   if (!wanted.json) print_end(*follower.last());
   const v1::Phase phase = follower.last()->phase();
-  if (phase != v1::LOCKED && phase != v1::CAPTURING) throw CLI::RuntimeError(1);
+  if (phase != v1::LOCKED && phase != v1::CAPTURING) throw Exit(1);
 }
 
 }  // namespace emberlock::cli

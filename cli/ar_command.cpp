@@ -226,85 +226,78 @@ Status draw_ar(ArArguments a, bool rate_told) try {
   return Error{ErrorKind::bad_input, "not enough memory", a.film, "Give a smaller or shorter video"};
 }
 
-void add_placement(CLI::App& verb, ArArguments& a) {
+void add_placement(const Verb& verb, ArArguments& a) {
   verb.add_option("--position", a.position,
                   "x,y,z (m): where the middle of the flame's foot stands; x to the marker's right, y "
                   "upwards along it, z out of it")
-      ->type_name("TEXT")
-      ->capture_default_str();
+      .set_type("TEXT")
+      .show_default();
   verb.add_option("--rotation", a.rotation, "x,y,z (degrees): around these axes, one after the other")
-      ->type_name("TEXT")
-      ->capture_default_str();
+      .set_type("TEXT")
+      .show_default();
   verb.add_option("--up", a.up,
                   "The result's axis that points out of the marker [as the cameras stood, or z]")
-      ->type_name("TEXT");
-  verb.add_option("--scale", a.scale, "Of the flame's lengths")
-      ->check(CLI::Range(1e-3, 1e3))
-      ->capture_default_str();
-  verb.add_option("--brightness", a.brightness, "Factor of its light")->capture_default_str();
+      .set_type("TEXT");
+  verb.add_option("--scale", a.scale, "Of the flame's lengths").check_range(1e-3, 1e3).show_default();
+  verb.add_option("--brightness", a.brightness, "Factor of its light").show_default();
   verb.add_option("--sequence-rate", a.sequence_rate, "Frames a second of a sequence of results")
-      ->check(CLI::Range(0.01, 1e4))
-      ->capture_default_str();
+      .check_range(0.01, 1e4)
+      .show_default();
   verb.add_flag("--once", a.once, "A sequence runs once, not again and again");
   verb.add_option("--plate", a.plate,
                   "Edge (m) of the square around the marker that the flame lights, and behind which it is "
                   "hidden; 0: none [6 markers]")
-      ->check(CLI::Range(0.0, 100.0));
+      .check_range(0.0, 100.0);
   verb.add_option("--albedo", a.albedo, "Of the marker's white; 0: the flame lights nothing")
-      ->check(CLI::Range(0.0, 1.0))
-      ->capture_default_str();
+      .check_range(0.0, 1.0)
+      .show_default();
 }
 
-void add_front(CLI::App& verb, ArArguments& a) {
+void add_front(const Verb& verb, ArArguments& a) {
   verb.add_option("--mask", a.mask,
                   "White is before the flame: a picture, a folder of one for each frame, or a video");
   verb.add_option("--depth", a.depth,
                   "What the frames show and how far away: a picture or a folder of them, grey of 16 bits, or "
                   "OpenEXR in metres");
   verb.add_option("--depth-unit", a.depth_unit, "Metres of a level of 16 bits")
-      ->check(CLI::Range(1e-6, 1.0))
-      ->capture_default_str();
+      .check_range(1e-6, 1.0)
+      .show_default();
 }
 
 }  // namespace
 
-void add_ar(CLI::App& app) {
+void add_ar(const Verb& app) {
   auto arguments = std::make_shared<ArArguments>();
   ArArguments& a = *arguments;
-  CLI::App* verb = app.add_subcommand("ar", "Puts a flame on a marker in a video: augmented reality");
-  verb->add_option("VIDEO", a.film, "A video; or a camera, by its name in `emberlock devices`")->required();
-  verb->add_option("RESULT", a.result,
-                   "Folder of reconstruct, a volume.vdb, or a folder of reconstruct --frames")
-      ->required();
-  verb->add_option("--out", a.out, "Folder for ar.mp4 or frame-0000.png and so on, and poses.json")
-      ->required();
-  verb->add_option("--marker", a.marker,
-                   "aruco:4X4_50:0:80mm (dictionary, number, edge of the black border), or "
-                   "charuco:5x4:30mm:22mm:4X4_50 (squares)")
-      ->required();
-  verb->add_option("--rig", a.rig, "The camera's calibration: rig.json, OpenCV's YAML, COLMAP's folder");
-  verb->add_option("--camera", a.camera, "Which of the calibration's cameras filmed");
-  verb->add_option("--focal", a.focal,
-                   "Instead of --rig: focal length in pixels, of a lens that bends nothing");
-  add_placement(*verb, a);
-  add_front(*verb, a);
-  verb->add_flag("--linear", a.linear, "The frames' levels are in proportion to light; else sRGB");
-  verb->add_option("--seconds", a.seconds, "That a camera films")
-      ->check(CLI::Range(0.1, 3600.0))
-      ->capture_default_str();
-  verb->add_option("--config", a.config, "emberlockd's configuration, one of whose cameras films");
-  verb->add_option("--format", a.format.format, "mp4: for any player; ffv1: lossless, in Matroska; png")
-      ->check(CLI::IsMember({"png", "mp4", "ffv1"}))
-      ->capture_default_str();
-  CLI::Option* rate =
-      verb->add_option("--rate", a.format.rate, "Frames a second of what is written [as it was filmed]");
-  verb->add_option("--step", a.step, "Of the march, at most, in voxel edges: more is faster")
-      ->check(CLI::Range(0.25, 8.0))
-      ->capture_default_str();
-  verb->add_option("--threads", a.threads, "CPU threads; 0: one per core")
-      ->check(CLI::Range(0, 256))
-      ->capture_default_str();
-  verb->callback([arguments, rate] { or_fail(draw_ar(*arguments, rate->count() > 0)); });
+  const Verb verb = app.add_verb("ar", "Puts a flame on a marker in a video: augmented reality");
+  verb.add_option("VIDEO", a.film, "A video; or a camera, by its name in `emberlock devices`").require();
+  verb.add_option("RESULT", a.result,
+                  "Folder of reconstruct, a volume.vdb, or a folder of reconstruct --frames")
+      .require();
+  verb.add_option("--out", a.out, "Folder for ar.mp4 or frame-0000.png and so on, and poses.json").require();
+  verb.add_option("--marker", a.marker,
+                  "aruco:4X4_50:0:80mm (dictionary, number, edge of the black border), or "
+                  "charuco:5x4:30mm:22mm:4X4_50 (squares)")
+      .require();
+  verb.add_option("--rig", a.rig, "The camera's calibration: rig.json, OpenCV's YAML, COLMAP's folder");
+  verb.add_option("--camera", a.camera, "Which of the calibration's cameras filmed");
+  verb.add_option("--focal", a.focal,
+                  "Instead of --rig: focal length in pixels, of a lens that bends nothing");
+  add_placement(verb, a);
+  add_front(verb, a);
+  verb.add_flag("--linear", a.linear, "The frames' levels are in proportion to light; else sRGB");
+  verb.add_option("--seconds", a.seconds, "That a camera films").check_range(0.1, 3600.0).show_default();
+  verb.add_option("--config", a.config, "emberlockd's configuration, one of whose cameras films");
+  verb.add_option("--format", a.format.format, "mp4: for any player; ffv1: lossless, in Matroska; png")
+      .check_choices({"png", "mp4", "ffv1"})
+      .show_default();
+  const Option rate =
+      verb.add_option("--rate", a.format.rate, "Frames a second of what is written [as it was filmed]");
+  verb.add_option("--step", a.step, "Of the march, at most, in voxel edges: more is faster")
+      .check_range(0.25, 8.0)
+      .show_default();
+  verb.add_threads(a.threads);
+  verb.set_action([arguments, rate] { or_fail(draw_ar(*arguments, rate.is_given())); });
 }
 
 }  // namespace emberlock::cli

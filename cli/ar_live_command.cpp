@@ -131,11 +131,11 @@ void run_ar_live(int fd) {
 
 }  // namespace
 
-void add_ar_live(CLI::App& app) {
+void add_ar_live(const Verb& app) {
   auto fd = std::make_shared<int>(-1);
-  CLI::App* verb = app.add_subcommand("ar-live", "Draws a flame into the frames on its stdin")->group("");
-  verb->add_option("--progress-fd", *fd, "Where pictures go: an open descriptor")->required();
-  verb->callback([fd] { run_ar_live(*fd); });
+  const Verb verb = app.add_verb("ar-live", "Draws a flame into the frames on its stdin").hide();
+  verb.add_option("--progress-fd", *fd, "Where pictures go: an open descriptor").require();
+  verb.set_action([fd] { run_ar_live(*fd); });
 }
 
 }  // namespace emberlock::cli

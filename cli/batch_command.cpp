@@ -36,32 +36,32 @@ const std::set<std::string>& of_a_run() {
   return names;
 }
 
-void add_batch_options(CLI::App* verb, BatchArguments& b) {
+void add_batch_options(const Verb& verb, BatchArguments& b) {
   ReconstructArguments& a = b.reconstruct;
-  verb->add_option("SESSION", a.input, "A recorded session's folder");
+  verb.add_option("SESSION", a.input, "A recorded session's folder");
   add_range_options(verb, a);
-  verb->add_option("--out", a.out, "Folder for the volumes, on a file system that all ranks share");
-  verb->add_option("--chunk", b.chunk,
-                   "Frames that one rank does in turn, the first from darkness, each further one from where "
-                   "the one before ended [a 64th of all, 5 to 20]")
-      ->check(CLI::Range(1, 1000000));
-  verb->add_option("--patience", b.patience_s,
-                   "Seconds until a rank of another machine that isn't heard of counts as dead")
-      ->check(CLI::Range(1.0, 86400.0))
-      ->capture_default_str();
+  verb.add_option("--out", a.out, "Folder for the volumes, on a file system that all ranks share");
+  verb.add_option("--chunk", b.chunk,
+                  "Frames that one rank does in turn, the first from darkness, each further one from where "
+                  "the one before ended [a 64th of all, 5 to 20]")
+      .check_range(1, 1000000);
+  verb.add_option("--patience", b.patience_s,
+                  "Seconds until a rank of another machine that isn't heard of counts as dead")
+      .check_range(1.0, 86400.0)
+      .show_default();
   add_volume_options(verb, a);
   add_solve_options(verb, a);
   for (const char* name : {"--budget", "--target-rmse"})  // what a clock ends never repeats
-    verb->remove_option(verb->get_option(name));
+    verb.remove_option(name);
   add_picture_options(verb, a);
   add_quantity_options(verb, a);
   add_certificate_options(verb, a.certificate);
 }
 
 void check_given(const BatchArguments& b) {
-  if (b.reconstruct.input.empty()) throw CLI::RequiredError("SESSION");
-  if (!b.reconstruct.last_frame) throw CLI::RequiredError("--frames");
-  if (b.reconstruct.out.empty()) throw CLI::RequiredError("--out");
+  if (b.reconstruct.input.empty()) throw UsageError("SESSION is required");
+  if (!b.reconstruct.last_frame) throw UsageError("--frames is required");
+  if (b.reconstruct.out.empty()) throw UsageError("--out is required");
 }
 
 std::string absolute(const std::string& path) {
@@ -70,17 +70,16 @@ std::string absolute(const std::string& path) {
 }
 
 /// As it is meant in every folder.
-std::string value_of(const CLI::Option& option) {
+std::string value_of(const Option& option) {
   static const std::set<std::string> kPaths{"--out", "--rig", "--response", "--key"};
-  const std::string value = fmt::format("{}", fmt::join(option.results(), ","));
-  return kPaths.contains(option.get_name()) ? absolute(value) : value;
+  const std::string value = fmt::format("{}", fmt::join(option.values(), ","));
+  return kPaths.contains(option.name()) ? absolute(value) : value;
 }
 
-std::map<std::string, std::string> given_to(const CLI::App& verb) {
+std::map<std::string, std::string> given_to(const Verb& verb) {
   std::map<std::string, std::string> given;
-  for (const CLI::Option* option : verb.get_options())
-    if (option->count() > 0 && !of_a_run().contains(option->get_name()))
-      given[option->get_name()] = value_of(*option);
+  for (const Option& option : verb.given_options())
+    if (!of_a_run().contains(option.name())) given[option.name()] = value_of(option);
   return given;
 }
 
@@ -92,21 +91,21 @@ struct SubmitArguments {
 };
 
 /// A rank's command line, which runs in another folder.
-std::vector<std::string> words_of(const SubmitArguments& s, const CLI::App& verb,
+std::vector<std::string> words_of(const SubmitArguments& s, const Verb& verb,
                                   const std::set<std::string>& of_slurm) {
   std::error_code ec;
   std::vector<std::string> words{fs::read_symlink("/proc/self/exe", ec).string(), "batch",
                                  absolute(s.batch.reconstruct.input)};
-  for (const CLI::Option* option : verb.get_options()) {
-    const std::string& name = option->get_name();
-    if (option->count() == 0 || name == "SESSION" || of_slurm.contains(name)) continue;
+  for (const Option& option : verb.given_options()) {
+    const std::string name = option.name();
+    if (name == "SESSION" || of_slurm.contains(name)) continue;
     words.push_back(name);
-    if (option->get_items_expected_max() > 0) words.push_back(value_of(*option));  // else a flag
+    if (option.takes_value()) words.push_back(value_of(option));  // else a flag
   }
   return words;
 }
 
-void submit_command(SubmitArguments& s, const CLI::App& verb) {
+void submit_command(SubmitArguments& s, const Verb& verb) {
   static const std::set<std::string> kOfSlurm{"--nodes", "--ranks", "--gpus", "--cpus", "--time", "--sbatch"};
   check_given(s.batch);
   s.batch.options = given_to(verb);
@@ -119,24 +118,22 @@ void submit_command(SubmitArguments& s, const CLI::App& verb) {
   std::printf("%-16s emberlock batch status %s\n", "look at", out.c_str());
 }
 
-void add_submit(CLI::App& batch) {
+void add_submit(const Verb& batch) {
   auto arguments = std::make_shared<SubmitArguments>();
-  CLI::App* verb = batch.add_subcommand("submit", "Writes a script for Slurm's sbatch, and submits it");
+  const Verb verb = batch.add_verb("submit", "Writes a script for Slurm's sbatch, and submits it");
   add_batch_options(verb, arguments->batch);
   SlurmJob& job = arguments->job;
-  verb->add_option("--nodes", job.nodes, "Machines")->check(CLI::Range(1, 100000))->capture_default_str();
-  verb->add_option("--ranks", job.ranks, "Ranks on each of them")
-      ->check(CLI::Range(1, 1024))
-      ->capture_default_str();
-  verb->add_option("--gpus", job.gpus, "GPUs of each of them: one a rank, ranks beyond them use the CPU")
-      ->check(CLI::Range(0, 1024))
-      ->capture_default_str();
-  verb->add_option("--cpus", job.cpus, "CPU threads of each rank [Slurm's rule]")->check(CLI::Range(1, 1024));
-  verb->add_option("--time", job.time, "Time limit, as sbatch takes it, such as 2:00:00 [the partition's]");
-  verb->add_option("--sbatch", job.further,
-                   "A further option of sbatch's, such as --sbatch=--partition=NAME; may be given again")
-      ->take_all();
-  verb->callback([arguments, verb] { submit_command(*arguments, *verb); });
+  verb.add_option("--nodes", job.nodes, "Machines").check_range(1, 100000).show_default();
+  verb.add_option("--ranks", job.ranks, "Ranks on each of them").check_range(1, 1024).show_default();
+  verb.add_option("--gpus", job.gpus, "GPUs of each of them: one a rank, ranks beyond them use the CPU")
+      .check_range(0, 1024)
+      .show_default();
+  verb.add_option("--cpus", job.cpus, "CPU threads of each rank [Slurm's rule]").check_range(1, 1024);
+  verb.add_option("--time", job.time, "Time limit, as sbatch takes it, such as 2:00:00 [the partition's]");
+  verb.add_option("--sbatch", job.further,
+                  "A further option of sbatch's, such as --sbatch=--partition=NAME; may be given again")
+      .take_all_values();
+  verb.set_action([arguments, verb] { submit_command(*arguments, verb); });
 }
 
 // --- status
@@ -169,30 +166,30 @@ void status_command(const std::string& folder) {
   if (!job.empty()) std::printf("%-16s %s\n", "job", job.c_str());
 }
 
-void add_batch_status(CLI::App& batch) {
+void add_batch_status(const Verb& batch) {
   auto folder = std::make_shared<std::string>();
-  CLI::App* verb =
-      batch.add_subcommand("status", "How far a batch is, who works on it, and what Slurm says of its job");
-  verb->add_option("DIR", *folder, "The batch's --out")->required();
-  verb->callback([folder] { status_command(*folder); });
+  const Verb verb =
+      batch.add_verb("status", "How far a batch is, who works on it, and what Slurm says of its job");
+  verb.add_option("DIR", *folder, "The batch's --out").require();
+  verb.set_action([folder] { status_command(*folder); });
 }
 
 }  // namespace
 
-void add_batch(CLI::App& app) {
+void add_batch(const Verb& app) {
   auto arguments = std::make_shared<BatchArguments>();
-  CLI::App* verb = app.add_subcommand(
+  const Verb verb = app.add_verb(
       "batch",
       "Reconstructs a session's frames on many ranks, which mpirun or Slurm starts; goes on where it ended");
   add_batch_options(verb, *arguments);
-  add_submit(*verb);
-  add_batch_status(*verb);
-  verb->require_subcommand(0, 1);
-  verb->callback([arguments, verb, &app] {
+  add_submit(verb);
+  add_batch_status(verb);
+  verb.allow_verb();
+  verb.set_action([arguments, verb, app] {
     arguments->reconstruct.certificate.program = app.version();
-    if (!verb->get_subcommands().empty()) return;
+    if (verb.verb_is_given()) return;
     check_given(*arguments);
-    arguments->options = given_to(*verb);
+    arguments->options = given_to(verb);
     run_batch_rank(*arguments,
                    recon::rank_from([](const char* name) -> const char* { return std::getenv(name); }));
   });

@@ -163,29 +163,25 @@ void bench(BenchArguments& a) {
 
 }  // namespace
 
-void add_bench(CLI::App& app) {
+void add_bench(const Verb& app) {
   auto arguments = std::make_shared<BenchArguments>();
   BenchArguments& a = *arguments;
-  CLI::App* verb =
-      app.add_subcommand("bench",
-                         "Measures this machine's CPU, GPU and disk beside the README's, and says "
-                         "what to expect for a rig. Takes 10 s on two cores.");
-  verb->add_option("--cameras", a.rig.cameras, "The rig's cameras")->capture_default_str();
-  verb->add_option("--size", a.size, "Of their pictures, WxH")->capture_default_str();
-  verb->add_option("--fps", a.rig.rate, "Frames a second")->capture_default_str();
-  verb->add_option("--bytes-per-pixel", a.rig.bytes_per_pixel,
-                   "As recorded: 1 for 8 bits, grey or a Bayer pattern; 2 for more bits; 3 for RGB")
-      ->capture_default_str();
-  verb->add_option("--voxels", a.rig.voxels, "Along the longest edge")->capture_default_str();
-  verb->add_option("--disk", a.folder, "A place on the recordings' disk; what is written there is removed")
-      ->capture_default_str();
-  verb->add_option("--device", a.device, "auto, cpu, cuda, or cuda:N: the GPU of this number")
-      ->capture_default_str();
-  verb->add_option("--threads", a.threads, "CPU threads; 0: one per core")
-      ->check(CLI::Range(0, 256))
-      ->capture_default_str();
-  verb->add_flag("--json", a.json, "One JSON object");
-  verb->callback([arguments] { bench(*arguments); });
+  const Verb verb = app.add_verb("bench",
+                                 "Measures this machine's CPU, GPU and disk beside the README's, and says "
+                                 "what to expect for a rig. Takes 10 s on two cores.");
+  verb.add_option("--cameras", a.rig.cameras, "The rig's cameras").show_default();
+  verb.add_option("--size", a.size, "Of their pictures, WxH").show_default();
+  verb.add_option("--fps", a.rig.rate, "Frames a second").show_default();
+  verb.add_option("--bytes-per-pixel", a.rig.bytes_per_pixel,
+                  "As recorded: 1 for 8 bits, grey or a Bayer pattern; 2 for more bits; 3 for RGB")
+      .show_default();
+  verb.add_option("--voxels", a.rig.voxels, "Along the longest edge").show_default();
+  verb.add_option("--disk", a.folder, "A place on the recordings' disk; what is written there is removed")
+      .show_default();
+  verb.add_device(a.device);
+  verb.add_threads(a.threads);
+  verb.add_flag("--json", a.json, "One JSON object");
+  verb.set_action([arguments] { bench(*arguments); });
 }
 
 }  // namespace emberlock::cli

@@ -149,44 +149,44 @@ void calibrate_cameras(const CamerasArguments& arguments) {
   } else {
     print_cameras(reading, calibration, arguments.out);
   }
-  if (!calibration.whole()) throw CLI::RuntimeError(1);
+  if (!calibration.whole()) throw Exit(1);
 }
 
-void add_cameras(CLI::App& parent) {
+void add_cameras(const Verb& parent) {
   auto arguments = std::make_shared<CamerasArguments>();
-  CLI::App* verb = parent.add_subcommand("cameras",
-                                         "Lenses and poses of all cameras from pictures or films of a board; "
-                                         "exit code 1 if a camera's pose couldn't be found");
+  const Verb verb = parent.add_verb("cameras",
+                                    "Lenses and poses of all cameras from pictures or films of a board; "
+                                    "exit code 1 if a camera's pose couldn't be found");
   CamerasArguments& a = *arguments;
-  add_board_options(*verb, a.boards, recon::FilmSearchOptions{}.instants);
-  verb->get_option("--board")->required();
-  verb->add_option("--out", a.out, "Folder for rig.json, index.html, transforms.json, opencv/ and colmap/")
-      ->required();
-  verb->add_option("--world", a.world,
-                   "Instant whose board sets the world frame: origin at its first corner, x along a row, z "
-                   "out of the board [the first instant that most cameras see]");
-  verb->add_option(
+  add_board_options(verb, a.boards, recon::FilmSearchOptions{}.instants);
+  verb.find_option("--board").require();
+  verb.add_option("--out", a.out, "Folder for rig.json, index.html, transforms.json, opencv/ and colmap/")
+      .require();
+  verb.add_option("--world", a.world,
+                  "Instant whose board sets the world frame: origin at its first corner, x along a row, z "
+                  "out of the board [the first instant that most cameras see]");
+  verb.add_option(
       "--box", a.box,
       "cx,cy,cz,sx,sy,sz: the flame's volume in that world, metres [the largest cube that all cameras see]");
-  verb->add_flag("--json", a.json, "One JSON object on stdout");
-  verb->callback([arguments] { calibrate_cameras(*arguments); });
+  verb.add_flag("--json", a.json, "One JSON object on stdout");
+  verb.set_action([arguments] { calibrate_cameras(*arguments); });
 }
 
-void add_convert(CLI::App& parent) {
+void add_convert(const Verb& parent) {
   struct Arguments {
     std::string rig;
     std::string out;
   };
   auto arguments = std::make_shared<Arguments>();
-  CLI::App* verb = parent.add_subcommand(
+  const Verb verb = parent.add_verb(
       "convert", "Converts another program's calibration to rig.json, and rig.json for other programs");
-  verb->add_option("rig", arguments->rig,
-                   "rig.json, transforms.json, OpenCV's YAML or XML (a file, or a folder of them), or a "
-                   "folder of COLMAP's text files")
-      ->required();
-  verb->add_option("--out", arguments->out, "Folder for rig.json, transforms.json, opencv/ and colmap/")
-      ->required();
-  verb->callback([arguments] {
+  verb.add_option("rig", arguments->rig,
+                  "rig.json, transforms.json, OpenCV's YAML or XML (a file, or a folder of them), or a "
+                  "folder of COLMAP's text files")
+      .require();
+  verb.add_option("--out", arguments->out, "Folder for rig.json, transforms.json, opencv/ and colmap/")
+      .require();
+  verb.set_action([arguments] {
     const v1::Rig rig = or_fail(recon::import_rig(arguments->rig));
     OutputFolder staging =
         or_fail(OutputFolder::create({arguments->out, kCalibrateConvert, {arguments->rig}}));
@@ -198,14 +198,14 @@ void add_convert(CLI::App& parent) {
 
 }  // namespace
 
-void add_calibrate(CLI::App& app) {
-  CLI::App* verb =
-      app.add_subcommand("calibrate", "Poses, lenses and colours of the cameras, and whether a camera moved");
-  verb->require_subcommand(1);
-  add_cameras(*verb);
-  add_calibrate_check(*verb);
-  add_convert(*verb);
-  add_calibrate_colour(*verb);
+void add_calibrate(const Verb& app) {
+  const Verb verb =
+      app.add_verb("calibrate", "Poses, lenses and colours of the cameras, and whether a camera moved");
+  verb.require_verb();
+  add_cameras(verb);
+  add_calibrate_check(verb);
+  add_convert(verb);
+  add_calibrate_colour(verb);
 }
 
 }  // namespace emberlock::cli

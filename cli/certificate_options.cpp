@@ -68,17 +68,17 @@ std::string words_of(const recon::Certification& certification, Seconds time) {
 
 }  // namespace
 
-CLI::Option* add_key_option(CLI::App* verb, std::string& key) {
-  return verb->add_option(
+Option add_key_option(const Verb& verb, std::string& key) {
+  return verb.add_option(
       "--key", key,
       "Sign the certificate with this private Ed25519 key (PEM), as `openssl genpkey -algorithm "
       "ed25519 -out FILE` makes it [unsigned]");
 }
 
-void add_certificate_options(CLI::App* verb, CertificateArguments& a) {
+void add_certificate_options(const Verb& verb, CertificateArguments& a) {
   add_key_option(verb, a.key);
-  verb->add_flag("--no-file-hashes", a.no_file_hashes,
-                 "Leave out of the certificate the hashes of the files that the volume is made of");
+  verb.add_flag("--no-file-hashes", a.no_file_hashes,
+                "Leave out of the certificate the hashes of the files that the volume is made of");
 }
 
 Result<std::shared_ptr<const SigningKey>> key_of(const std::string& file) {

@@ -25,9 +25,9 @@ struct CertificateArguments {
 };
 
 /// Adds --key.
-CLI::Option* add_key_option(CLI::App* verb, std::string& key);
+Option add_key_option(const Verb& verb, std::string& key);
 /// Adds --key and --no-file-hashes.
-void add_certificate_options(CLI::App* verb, CertificateArguments& a);
+void add_certificate_options(const Verb& verb, CertificateArguments& a);
 
 /// The key of a file; null where none is named.
 Result<std::shared_ptr<const SigningKey>> key_of(const std::string& file);

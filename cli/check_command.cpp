@@ -114,27 +114,28 @@ void check(const CheckArguments& arguments) {
     if (reading.film) std::printf("%s\n", films::film_words(reading).c_str());
     print_drift(drift);
   }
-  if (drift.drifted()) throw CLI::RuntimeError(1);
+  if (drift.drifted()) throw Exit(1);
 }
 
 }  // namespace
 
-void add_calibrate_check(CLI::App& parent) {
+void add_calibrate_check(const Verb& parent) {
   auto arguments = std::make_shared<CheckArguments>();
-  CLI::App* verb = parent.add_subcommand("check",
-                                         "Whether a camera moved since the calibration, from later pictures "
-                                         "of the board or a lamp; exit code 1 if one did");
-  verb->add_option("rig", arguments->rig, "rig.json, or another calibration that `calibrate convert` reads")
-      ->required();
-  add_board_options(*verb, arguments->boards, kCheckInstants);
-  CLI::Option* lamp =
-      verb->add_flag("--lamp", arguments->lamp,
-                     "The pictures show one small bright lamp, such as the strobe's, at a new place at each "
-                     "instant. Three places show all movements, one or two only rotations");
-  verb->get_option("--board")->excludes(lamp);
-  verb->add_flag("--json", arguments->json, "One JSON object on stdout");
-  verb->callback([arguments] {
-    if (!arguments->lamp && arguments->boards.board.empty()) throw CLI::RequiredError("--board or --lamp");
+  const Verb verb = parent.add_verb("check",
+                                    "Whether a camera moved since the calibration, from later pictures "
+                                    "of the board or a lamp; exit code 1 if one did");
+  verb.add_option("rig", arguments->rig, "rig.json, or another calibration that `calibrate convert` reads")
+      .require();
+  add_board_options(verb, arguments->boards, kCheckInstants);
+  const Option lamp =
+      verb.add_flag("--lamp", arguments->lamp,
+                    "The pictures show one small bright lamp, such as the strobe's, at a new place at each "
+                    "instant. Three places show all movements, one or two only rotations");
+  verb.find_option("--board").exclude(lamp);
+  verb.add_flag("--json", arguments->json, "One JSON object on stdout");
+  verb.set_action([arguments] {
+    if (!arguments->lamp && arguments->boards.board.empty())
+      throw UsageError("--board or --lamp is required");
     check(*arguments);
   });
 }

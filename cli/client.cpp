@@ -318,13 +318,13 @@ Client connect_or_leave(const DaemonAddress& address) {
   if (client) return std::move(*client);
   if (client.error().kind == ErrorKind::bad_input) fail(client.error());
   std::fprintf(stderr, "emberlock: %s\n", client.error().message().c_str());
-  throw CLI::RuntimeError(client.error().message(), kUnreachable);
+  throw Exit(kUnreachable, client.error().message());
 }
 
 void leave(const Client& client, const Error& error) {
   if (!client.lost()) fail(error);
   std::fprintf(stderr, "emberlock: %s\n", error.message().c_str());
-  throw CLI::RuntimeError(error.message(), kUnreachable);
+  throw Exit(kUnreachable, error.message());
 }
 
 }  // namespace emberlock::cli

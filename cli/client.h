@@ -6,9 +6,8 @@
 #include <memory>
 #include <string>
 
-#include <CLI/CLI.hpp>
-
 #include "base/result.h"
+#include "cli/command_line.h"
 #include "emberlock/v1/services.pb.h"
 
 namespace emberlock::cli {
@@ -28,9 +27,9 @@ struct DaemonAddress {
 };
 
 /// Adds --daemon (which it returns), --tls-ca, --tls-certificate, --tls-key and --token-file.
-CLI::Option* add_daemon_options(CLI::App& verb, DaemonAddress& address);
+Option add_daemon_options(const Verb& verb, DaemonAddress& address);
 /// Whether an option is one of these.
-bool is_daemon_option(const CLI::Option& option);
+bool is_daemon_option(const Option& option);
 
 /// The client of emberlockd. Every call has a deadline. A stream lasts until the daemon ends it, `take`
 /// returns false, or `stop`, polled several times a second, returns true; the last two aren't errors. Errors

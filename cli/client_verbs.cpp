@@ -3,7 +3,7 @@
 
 namespace emberlock::cli {
 
-void add_client(CLI::App& app) {
+void add_client(const Verb& app) {
   add_status(app);
   add_jobs(app);
   add_console(app);

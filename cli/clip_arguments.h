@@ -4,9 +4,8 @@
 #include <optional>
 #include <string>
 
-#include <CLI/CLI.hpp>
-
 #include "base/quantity.h"
+#include "cli/command_line.h"
 #include "smear_sync/verify/clip_clock.h"
 
 namespace emberlock::cli {
@@ -25,7 +24,7 @@ struct ClipArguments {
 };
 
 /// Adds the options to a verb and returns --flash-rate, which the verb may require.
-CLI::Option* add_clip_options(CLI::App& verb, ClipArguments& arguments);
+Option add_clip_options(const Verb& verb, ClipArguments& arguments);
 
 /// All options except the row time.
 smear::ClipOptions clip_options_of(const ClipArguments& arguments);

@@ -53,16 +53,16 @@ Status fetch_clips(const ClipsArguments& arguments) {
 
 }  // namespace
 
-void add_clips(CLI::App& devices) {
+void add_clips(const Verb& devices) {
   auto a = std::make_shared<ClipsArguments>();
-  CLI::App* verb =
-      devices.add_subcommand("clips",
-                             "Downloads the movies on a USB camera's card, with their checksums. Movies that "
-                             "were downloaded before are skipped. The card is only read. `emberlock import "
-                             "OUT` makes a session of several cameras' movies.");
-  verb->add_option("ID", a->id, "The camera, as `emberlock devices` names it")->required();
-  verb->add_option("--out", a->out, "Folder for the movies, in a subfolder per camera")->required();
-  verb->callback([a] {
+  const Verb verb =
+      devices.add_verb("clips",
+                       "Downloads the movies on a USB camera's card, with their checksums. Movies that "
+                       "were downloaded before are skipped. The card is only read. `emberlock import "
+                       "OUT` makes a session of several cameras' movies.");
+  verb.add_option("ID", a->id, "The camera, as `emberlock devices` names it").require();
+  verb.add_option("--out", a->out, "Folder for the movies, in a subfolder per camera").require();
+  verb.set_action([a] {
     if (const Status done = fetch_clips(*a); !done) fail(done.error());
   });
 }

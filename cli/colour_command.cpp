@@ -118,70 +118,70 @@ Status calibrate(const ColourArguments& arguments) {
   return calibrate_black_body(black_body);
 }
 
-void add_black_body_options(CLI::App& verb, BlackBodyArguments& a) {
-  CLI::Option* temperatures = verb.add_option(
+void add_black_body_options(const Verb& verb, BlackBodyArguments& a) {
+  const Option temperatures = verb.add_option(
       "--black-body", a.temperatures,
       "T[,T2...]: finds the spectral response and its absolute scale instead, from one picture for each of "
       "these true temperatures in K (500 to 6000)");
   verb.add_option("--emitter", a.emitter,
                   "What glows: furnace (emissivity 1), tungsten (a ribbon), or its emissivity")
-      ->capture_default_str()
-      ->needs(temperatures);
+      .show_default()
+      .need(temperatures);
   verb.add_option("--window", a.window,
                   "Share of the light that a lamp's glass, or other windows, let through")
-      ->check(CLI::Range(0.01, 1.0))
-      ->capture_default_str()
-      ->needs(temperatures);
+      .check_range(0.01, 1.0)
+      .show_default()
+      .need(temperatures);
   verb.add_option("--temperature-sigma", a.temperature_sigma, "Standard error of each temperature, K")
-      ->check(CLI::Range(0.0, 500.0))
-      ->capture_default_str()
-      ->needs(temperatures);
+      .check_range(0.0, 500.0)
+      .show_default()
+      .need(temperatures);
   verb.add_option("--region", a.region, "x,y,width,height: where it glows [the brightest even rectangle]")
-      ->needs(temperatures);
+      .need(temperatures);
   verb.add_option("--dark", a.dark, "A picture without light, which is subtracted [black is 0]")
-      ->needs(temperatures);
+      .need(temperatures);
   verb.add_option("--base", a.base,
                   "The response that is scaled, shifted and widened: srgb (a camera that shows linear sRGB), "
                   "sensor (the same without negative lobes), or a response.json")
-      ->capture_default_str()
-      ->needs(temperatures);
+      .show_default()
+      .need(temperatures);
   verb.add_option("--exposure", a.exposures,
                   "Exposure time of the pictures in s, or one for each: S1,S2,... The response holds at the "
                   "first; rig.json keeps it [all alike]")
-      ->needs(temperatures);
+      .need(temperatures);
   verb.add_option("--camera", a.camera,
                   "With --rig: the camera that took the pictures; its gains and vignetting are applied, and "
                   "it gets the response [the only one]")
-      ->needs(temperatures);
+      .need(temperatures);
 }
 
 }  // namespace
 
-void add_calibrate_colour(CLI::App& parent) {
+void add_calibrate_colour(const Verb& parent) {
   auto arguments = std::make_shared<ColourArguments>();
-  CLI::App* verb = parent.add_subcommand(
+  const Verb verb = parent.add_verb(
       "colour",
       "Responses, gains between cameras, vignetting and dark levels, from pictures of one target; with "
       "--black-body a camera's spectral response, from pictures of a furnace or lamp of known temperatures");
   ColourArguments& a = *arguments;
-  verb->add_option(
+  verb.add_option(
           "folder", a.inputs,
           "Folder with colour.json (where the patches are) and a subfolder per camera with its pictures "
           "target[_LIGHT][_SECONDSs], flat and dark; or with a session, whose frames colour.json names so. "
           "With --black-body: pictures")
-      ->required();
-  verb->add_option("--out", a.out,
-                   "Folder for rig.json and colour.html, the report; with --black-body for response.json, "
-                   "response.html and, with --rig, rig.json")
-      ->required();
-  verb->add_option("--rig", a.rig, "A rig.json to add the colours to [a new one with the colours only]");
-  verb->add_option(
+      .require();
+  verb.add_option("--out", a.out,
+                  "Folder for rig.json and colour.html, the report; with --black-body for response.json, "
+                  "response.html and, with --rig, rig.json")
+      .require();
+  verb.add_option("--rig", a.rig, "A rig.json to add the colours to [a new one with the colours only]");
+  verb.add_option(
           "--gamma", a.gamma,
           "Exponent of the power law that is the cameras' response [found from exposures or radiances; "
           "with --black-body linear]")
-      ->check(CLI::Range(0.3, 5.0));
-  add_black_body_options(*verb, a.black_body);
-  verb->callback([arguments] { or_fail(calibrate(*arguments)); });
+      .check_range(0.3, 5.0);
+  add_black_body_options(verb, a.black_body);
+  verb.set_action([arguments] { or_fail(calibrate(*arguments)); });
 }
 
 }  // namespace emberlock::cli

@@ -25,18 +25,19 @@ struct Place {
   std::vector<Word> words;
 };
 
-std::vector<Place> places_of(const CLI::App& app) {
+std::vector<Place> places_of(const Verb& program) {
   std::vector<Place> places;
-  visit(app, app.get_name(), [&](const CLI::App& verb, const std::string& path) {
-    Place& place = places.emplace_back(Place{path, {}});
-    for (const CLI::App* below : verbs_of(verb))
-      place.words.push_back({Word::Kind::verb, below->get_name(), first_clause(below->get_description())});
-    for (const CLI::Option* option : options_of(verb)) {
-      const Word::Kind kind = takes_value(*option) ? Word::Kind::option : Word::Kind::flag;
-      for (const std::string& name : option->get_lnames())
-        place.words.push_back({kind, name, first_clause(option->get_description())});
+  const VerbWords tree = describe_tree(program);
+  for (const VerbWords* verb : list_verbs(tree)) {
+    Place& place = places.emplace_back(Place{verb->path, {}});
+    for (const VerbWords& below : verb->verbs)
+      place.words.push_back({Word::Kind::verb, below.name, first_clause(below.description)});
+    for (const OptionWords& option : verb->options) {
+      const Word::Kind kind = option.takes_value ? Word::Kind::option : Word::Kind::flag;
+      for (const std::string& name : option.long_names)
+        place.words.push_back({kind, name, first_clause(option.description)});
     }
-  });
+  }
   return places;
 }
 
@@ -65,8 +66,8 @@ std::string valued_among(const std::vector<Place>& places) {
 
 }  // namespace
 
-std::string bash_completion(const CLI::App& app) {
-  const std::vector<Place> places = places_of(app);
+std::string bash_completion(const Verb& program) {
+  const std::vector<Place> places = places_of(program);
   std::string offers;
   for (const Place& place : places) {
     std::vector<std::string> words;
@@ -92,8 +93,8 @@ std::string bash_completion(const CLI::App& app) {
          "complete -o bashdefault -o default -F _emberlock emberlock\n";
 }
 
-std::string zsh_completion(const CLI::App& app) {
-  const std::vector<Place> places = places_of(app);
+std::string zsh_completion(const Verb& program) {
+  const std::vector<Place> places = places_of(program);
   std::string offers;
   for (const Place& place : places) {
     offers += "    " + in_quotes(place.path) + ") offers=(\n";
@@ -122,8 +123,8 @@ std::string zsh_completion(const CLI::App& app) {
          "_emberlock \"$@\"\n";
 }
 
-std::string fish_completion(const CLI::App& app) {
-  const std::vector<Place> places = places_of(app);
+std::string fish_completion(const Verb& program) {
+  const std::vector<Place> places = places_of(program);
   std::string script =
       "# fish completion of emberlock; made by `emberlock completion fish`\n"
       "function __emberlock_at --description 'Whether these are the verbs that were typed'\n"

@@ -3,13 +3,13 @@
 
 #include <string>
 
-#include <CLI/CLI.hpp>
+#include "cli/command_line.h"
 
 namespace emberlock::cli {
 
 // Shell scripts that complete verbs and options, and file names for values of options.
-std::string bash_completion(const CLI::App& app);
-std::string zsh_completion(const CLI::App& app);  ///< to be stored as _emberlock in a folder of fpath
-std::string fish_completion(const CLI::App& app);
+std::string bash_completion(const Verb& program);
+std::string zsh_completion(const Verb& program);  ///< to be stored as _emberlock in a folder of fpath
+std::string fish_completion(const Verb& program);
 
 }  // namespace emberlock::cli

@@ -30,14 +30,13 @@ void print_link(const ConsoleArguments& arguments) {
 
 }  // namespace
 
-void add_console(CLI::App& app) {
+void add_console(const Verb& app) {
   auto arguments = std::make_shared<ConsoleArguments>();
-  CLI::App* verb = app.add_subcommand(
+  const Verb verb = app.add_verb(
       "console", "Prints a link that opens the console in a browser. The daemon must be on this machine");
-  add_daemon_options(*verb, arguments->daemon);
-  verb->add_flag("--json", arguments->json,
-                 "ConsoleLink of emberlock/v1/services.proto, as JSON on one line");
-  verb->callback([arguments] { print_link(*arguments); });
+  add_daemon_options(verb, arguments->daemon);
+  verb.add_flag("--json", arguments->json, "ConsoleLink of emberlock/v1/services.proto, as JSON on one line");
+  verb.set_action([arguments] { print_link(*arguments); });
 }
 
 }  // namespace emberlock::cli

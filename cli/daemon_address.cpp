@@ -16,17 +16,17 @@ std::string usual_daemon() {
   return named == nullptr || *named == '\0' ? "unix:" + usual_socket().string() : named;
 }
 
-CLI::Option* add_daemon_options(CLI::App& verb, DaemonAddress& address) {
+Option add_daemon_options(const Verb& verb, DaemonAddress& address) {
   const auto file = [&verb](const char* name, std::filesystem::path& path, const char* words,
                             const char* environment) {
-    verb.add_option(name, path, words)->envname(environment)->type_name("FILE")->group(kDaemonGroup);
+    verb.add_option(name, path, words).read_environment(environment).set_type("FILE").set_group(kDaemonGroup);
   };
-  CLI::Option* where =
+  const Option where =
       verb.add_option(
               "--daemon", address.address,
               "Address of emberlockd: unix:PATH or HOST:PORT [EMBERLOCK_DAEMON, else your own daemon's "
               "socket, else unix:/run/emberlock/emberlockd.sock]")
-          ->group(kDaemonGroup);
+          .set_group(kDaemonGroup);
   file("--tls-ca", address.tls_ca,
        "HOST:PORT only: PEM of the authority that signed the daemon's certificate", "EMBERLOCK_TLS_CA");
   file("--token-file", address.token_file, "HOST:PORT only: file with the daemon's token",
@@ -38,6 +38,6 @@ CLI::Option* add_daemon_options(CLI::App& verb, DaemonAddress& address) {
   return where;
 }
 
-bool is_daemon_option(const CLI::Option& option) { return option.get_group() == kDaemonGroup; }
+bool is_daemon_option(const Option& option) { return option.group() == kDaemonGroup; }
 
 }  // namespace emberlock::cli

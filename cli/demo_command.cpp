@@ -60,7 +60,7 @@ Progress stoppable(const std::string& title) {
     for (const std::string& line : result.kept)
       std::printf("kept             %s/%s\n", out.c_str(), line.c_str());
   }
-  throw CLI::RuntimeError(1);
+  throw Exit(1);
 }
 
 void demo_command(DemoArguments arguments) {
@@ -77,24 +77,24 @@ void demo_command(DemoArguments arguments) {
 
 }  // namespace
 
-void add_demo(CLI::App& app) {
+void add_demo(const Verb& app) {
   auto arguments = std::make_shared<DemoArguments>();
-  CLI::App* verb = app.add_subcommand(
+  const Verb verb = app.add_verb(
       "demo", "The whole workflow on simulated cameras: aligns, records, reconstructs, and writes a report");
   DemoArguments& a = *arguments;
-  verb->add_option("--out", a.out, "Folder for report.html, summary.png, the sessions and the reconstruction")
-      ->required();
-  verb->add_option("--cameras", a.demo.cameras, "Number of cameras; the middle one is held out")
-      ->capture_default_str();
-  verb->add_option("--image", a.image, "Size of the pictures")->capture_default_str();
-  verb->add_option("--frames", a.demo.flame_frames, "Frames of the flame that each camera records")
-      ->capture_default_str();
-  verb->add_option("--voxels", a.demo.voxels, "Voxels along the volume's edge")->capture_default_str();
-  verb->add_option("--threads", a.demo.threads, "CPU threads of the reconstruction; 0: one per core")
-      ->check(CLI::Range(0, 256))
-      ->capture_default_str();
-  verb->add_option("--seed", a.demo.seed, "Seed of all random numbers")->capture_default_str();
-  verb->callback([arguments] { demo_command(*arguments); });
+  verb.add_option("--out", a.out, "Folder for report.html, summary.png, the sessions and the reconstruction")
+      .require();
+  verb.add_option("--cameras", a.demo.cameras, "Number of cameras; the middle one is held out")
+      .show_default();
+  verb.add_option("--image", a.image, "Size of the pictures").show_default();
+  verb.add_option("--frames", a.demo.flame_frames, "Frames of the flame that each camera records")
+      .show_default();
+  verb.add_option("--voxels", a.demo.voxels, "Voxels along the volume's edge").show_default();
+  verb.add_option("--threads", a.demo.threads, "CPU threads of the reconstruction; 0: one per core")
+      .check_range(0, 256)
+      .show_default();
+  verb.add_option("--seed", a.demo.seed, "Seed of all random numbers").show_default();
+  verb.set_action([arguments] { demo_command(*arguments); });
 }
 
 }  // namespace emberlock::cli

@@ -174,55 +174,51 @@ void run_design(const DesignArguments& a) {
                       page.design.chosen.error(), report::shares_text(page.design.chosen.squares))});
 }
 
-void add_assumptions(CLI::App& verb, DesignArguments& a) {
+void add_assumptions(const Verb& verb, DesignArguments& a) {
   evaluate::DesignRequest& r = a.request;
   verb.add_option("--tolerance", a.tolerance_ms, "Within which the cameras are aligned, ms to either side")
-      ->capture_default_str();
+      .show_default();
   verb.add_option("--noise", r.noise, "RMS of a pixel at 4 ms exposure of a flame of 1800 K, grey levels")
-      ->capture_default_str();
-  verb.add_option("--lens", r.lens, "Its field of view, degrees across")->capture_default_str();
-  verb.add_option("--most-cameras", r.most_cameras, "To consider")->capture_default_str();
-  verb.add_option("--fps", a.rate, "Frames a second")->capture_default_str();
-  verb.add_option("--seconds", a.seconds, "Of film, to record and to reconstruct")->capture_default_str();
-  verb.add_option("--bytes-per-pixel", r.bytes_per_pixel, "As recorded")->capture_default_str();
-  verb.add_option("--camera-price", r.camera_price, "Euros")->capture_default_str();
-  verb.add_option("--host-link", a.host_link, "MB/s that a computer takes of all its cameras")
-      ->capture_default_str();
+      .show_default();
+  verb.add_option("--lens", r.lens, "Its field of view, degrees across").show_default();
+  verb.add_option("--most-cameras", r.most_cameras, "To consider").show_default();
+  verb.add_option("--fps", a.rate, "Frames a second").show_default();
+  verb.add_option("--seconds", a.seconds, "Of film, to record and to reconstruct").show_default();
+  verb.add_option("--bytes-per-pixel", r.bytes_per_pixel, "As recorded").show_default();
+  verb.add_option("--camera-price", r.camera_price, "Euros").show_default();
+  verb.add_option("--host-link", a.host_link, "MB/s that a computer takes of all its cameras").show_default();
 }
 
 }  // namespace
 
-void add_design(CLI::App& app) {
+void add_design(const Verb& app) {
   auto arguments = std::make_shared<DesignArguments>();
   DesignArguments& a = *arguments;
-  CLI::App* verb = app.add_subcommand(
+  const Verb verb = app.add_verb(
       "design",
       "Says before you buy how many cameras a flame needs, where they stand, and what it costs; with --rig, "
       "where one more camera helps most. Simulates small rigs, which takes about a minute.");
-  verb->add_option("--flame", a.flame,
-                   "Its height in metres, upward speed in m/s and temperature in K: 0.16,2,1800")
-      ->required();
-  verb->add_option("--target-error", a.target, "Held-out RMS error to reach, grey levels");
-  verb->add_option("--rig", a.rig, "rig.json: says where one more camera of this rig would do most");
-  verb->add_option(
+  verb.add_option("--flame", a.flame,
+                  "Its height in metres, upward speed in m/s and temperature in K: 0.16,2,1800")
+      .require();
+  verb.add_option("--target-error", a.target, "Held-out RMS error to reach, grey levels");
+  verb.add_option("--rig", a.rig, "rig.json: says where one more camera of this rig would do most");
+  verb.add_option(
       "--law", a.law,
       "report.json of an earlier design: its simulated rigs serve any flame, so none is simulated");
-  verb->add_option("--out", a.out, "Folder for report.html and report.json");
-  verb->add_option(
+  verb.add_option("--out", a.out, "Folder for report.html and report.json");
+  verb.add_option(
           "--machine", a.machines,
           "What `emberlock bench --json` printed on another machine; give the option again for another")
-      ->allow_extra_args(false);
-  verb->add_option("--disk", a.disk, "A place on the recordings' disk; what is written there is removed")
-      ->capture_default_str();
-  add_assumptions(*verb, a);
-  verb->add_option("--seed", a.seed, "Of the simulated flame, its noise and its times")
-      ->capture_default_str();
-  verb->add_option("--threads", a.threads, "CPU threads; 0: one per core")
-      ->check(CLI::Range(0, 256))
-      ->capture_default_str();
-  verb->add_flag("--check", a.check, "Measures five rigs that the law wasn't fitted to, beside its word");
-  verb->add_flag("--json", a.json, "Prints report.json on stdout");
-  verb->callback([arguments] { run_design(*arguments); });
+      .take_one_value();
+  verb.add_option("--disk", a.disk, "A place on the recordings' disk; what is written there is removed")
+      .show_default();
+  add_assumptions(verb, a);
+  verb.add_option("--seed", a.seed, "Of the simulated flame, its noise and its times").show_default();
+  verb.add_threads(a.threads);
+  verb.add_flag("--check", a.check, "Measures five rigs that the law wasn't fitted to, beside its word");
+  verb.add_flag("--json", a.json, "Prints report.json on stdout");
+  verb.set_action([arguments] { run_design(*arguments); });
 }
 
 }  // namespace emberlock::cli

@@ -223,50 +223,48 @@ void probe(const ProbeArguments& arguments) {
   } else {
     print_probe(probed);
   }
-  if (probed.verdict.fitness == drivers::Fitness::unfit) throw CLI::RuntimeError(1);
+  if (probed.verdict.fitness == drivers::Fitness::unfit) throw Exit(1);
 }
 
-void add_probe(CLI::App& devices) {
+void add_probe(const Verb& devices) {
   auto a = std::make_shared<ProbeArguments>();
-  CLI::App* verb = devices.add_subcommand(
+  const Verb verb = devices.add_verb(
       "probe",
       "Films for some seconds with one camera and assesses rate, losses by cause, arrival times and "
       "bandwidth. Of a serial port it finds out whether a strobe is connected, and which.");
-  verb->add_option("ID", a->id, "The camera or port, as `emberlock devices` names it")->required();
-  verb->add_option("--seconds", a->seconds, "How long to film")
-      ->check(CLI::Range(0.5, 3600.0))
-      ->capture_default_str();
-  verb->add_option("--resets", a->resets, "Then measure the delay of so many resets of its shutter")
-      ->check(CLI::Range(0, 1000));
-  verb->add_option("--size", a->size, "WIDTHxHEIGHT [the largest]");
-  verb->add_option("--rate", a->rate, "Frames per second [the fastest]")->check(CLI::PositiveNumber);
-  verb->add_option("--format", a->format, "Pixel format [the one that keeps most]")
-      ->check(CLI::IsMember(pixel_formats()));
-  verb->add_option("--exposure-ms", a->exposure_ms, "Exposure time, ms [the camera's own setting]")
-      ->check(CLI::PositiveNumber);
-  verb->add_option("--control", a->controls, "NAME=VALUE, by the camera's own names; may be repeated");
-  verb->add_option("--rig", a->rig, "A virtual rig instead of what is plugged in: virtual:11");
-  verb->add_flag("--json", a->json, "One JSON object");
-  verb->callback([a] { probe(*a); });
+  verb.add_option("ID", a->id, "The camera or port, as `emberlock devices` names it").require();
+  verb.add_option("--seconds", a->seconds, "How long to film").check_range(0.5, 3600.0).show_default();
+  verb.add_option("--resets", a->resets, "Then measure the delay of so many resets of its shutter")
+      .check_range(0, 1000);
+  verb.add_option("--size", a->size, "WIDTHxHEIGHT [the largest]");
+  verb.add_option("--rate", a->rate, "Frames per second [the fastest]").check_positive();
+  verb.add_option("--format", a->format, "Pixel format [the one that keeps most]")
+      .check_choices(names_of(pixel_formats()));
+  verb.add_option("--exposure-ms", a->exposure_ms, "Exposure time, ms [the camera's own setting]")
+      .check_positive();
+  verb.add_option("--control", a->controls, "NAME=VALUE, by the camera's own names; may be repeated");
+  verb.add_option("--rig", a->rig, "A virtual rig instead of what is plugged in: virtual:11");
+  verb.add_flag("--json", a->json, "One JSON object");
+  verb.set_action([a] { probe(*a); });
 }
 
 }  // namespace
 
-void add_devices(CLI::App& app) {
+void add_devices(const Verb& app) {
   auto a = std::make_shared<ListArguments>();
-  CLI::App* verb = app.add_subcommand(
+  const Verb verb = app.add_verb(
       "devices",
       "Lists the connected cameras and serial ports, what they can do, and which process holds them.");
-  verb->require_subcommand(0, 1);
-  verb->add_flag("--modes", a->all_modes, "List every mode of each camera");
-  verb->add_flag("--json", a->json, "One JSON object");
-  verb->callback([a, verb] {
-    if (verb->get_subcommands().empty()) list(*a);
+  verb.allow_verb();
+  verb.add_flag("--modes", a->all_modes, "List every mode of each camera");
+  verb.add_flag("--json", a->json, "One JSON object");
+  verb.set_action([a, verb] {
+    if (!verb.verb_is_given()) list(*a);
   });
-  add_probe(*verb);
-  add_clips(*verb);
-  verb->add_subcommand("watch", "Reports devices that are connected or disconnected, until Ctrl-C.")
-      ->callback(watch);
+  add_probe(verb);
+  add_clips(verb);
+  verb.add_verb("watch", "Reports devices that are connected or disconnected, until Ctrl-C.")
+      .set_action(watch);
 }
 
 }  // namespace emberlock::cli

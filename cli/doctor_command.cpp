@@ -53,21 +53,21 @@ void examine(const DoctorArguments& arguments) {
   if (std::any_of(findings.begin(), findings.end(), [](const rig::doctor::Finding& finding) {
         return finding.health == rig::doctor::Health::fail;
       })) {
-    throw CLI::RuntimeError(1);
+    throw Exit(1);
   }
 }
 
 }  // namespace
 
-void add_doctor(CLI::App& app) {
+void add_doctor(const Verb& app) {
   auto a = std::make_shared<DoctorArguments>();
-  CLI::App* verb = app.add_subcommand("doctor",
-                                      "Checks groups, rules, limits, network, disk, clock and configuration, "
-                                      "and says what to do. Writes to the "
-                                      "recordings' disk for two seconds.");
-  verb->add_option("--config", a->options.config_file, "The daemon's configuration")->capture_default_str();
-  verb->add_flag("--json", a->json, "One JSON object");
-  verb->callback([a] { examine(*a); });
+  const Verb verb = app.add_verb("doctor",
+                                 "Checks groups, rules, limits, network, disk, clock and configuration, "
+                                 "and says what to do. Writes to the "
+                                 "recordings' disk for two seconds.");
+  verb.add_option("--config", a->options.config_file, "The daemon's configuration").show_default();
+  verb.add_flag("--json", a->json, "One JSON object");
+  verb.set_action([a] { examine(*a); });
 }
 
 }  // namespace emberlock::cli

@@ -62,35 +62,33 @@ std::string names_of_methods() {
 
 }  // namespace
 
-void add_evaluate(CLI::App& app) {
+void add_evaluate(const Verb& app) {
   auto arguments = std::make_shared<EvaluateArguments>();
   EvaluateArguments& a = *arguments;
-  CLI::App* verb = app.add_subcommand("evaluate", "Compares methods on flames with known truth");
-  verb->require_subcommand(1);
-  CLI::App* paper = verb->add_subcommand(
-      "paper", "The paper's tables and figures again, with every method on the same pictures");
+  const Verb verb = app.add_verb("evaluate", "Compares methods on flames with known truth");
+  verb.require_verb();
+  const Verb paper =
+      verb.add_verb("paper", "The paper's tables and figures again, with every method on the same pictures");
   paper
-      ->add_option("--out", a.out,
-                   "Folder for report/, runs/ and truth/; one that was begun with the same settings goes on")
-      ->required();
-  paper->add_flag("--quick", a.quick, "Small pictures and few cameras: a minute instead of half an hour");
-  paper->add_option("--only", a.options.only, "Some of the tables: " + names_of_protocols())->delimiter(',');
-  paper->add_option("--methods", a.options.methods, "Some of the methods: " + names_of_methods())
-      ->delimiter(',');
-  paper->add_option("--cells", a.options.cells,
-                    "Of the simulated gas along each edge, a multiple of 32 [192; quick: 64]");
-  paper->add_option("--voxels", a.options.voxels, "Of every reconstruction along an edge [128; quick: 48]");
-  paper->add_option("--seed", a.options.seed, "Of what is random: noise, methods")->capture_default_str();
+      .add_option("--out", a.out,
+                  "Folder for report/, runs/ and truth/; one that was begun with the same settings goes on")
+      .require();
+  paper.add_flag("--quick", a.quick, "Small pictures and few cameras: a minute instead of half an hour");
+  paper.add_option("--only", a.options.only, "Some of the tables: " + names_of_protocols()).split_at_commas();
+  paper.add_option("--methods", a.options.methods, "Some of the methods: " + names_of_methods())
+      .split_at_commas();
+  paper.add_option("--cells", a.options.cells,
+                   "Of the simulated gas along each edge, a multiple of 32 [192; quick: 64]");
+  paper.add_option("--voxels", a.options.voxels, "Of every reconstruction along an edge [128; quick: 48]");
+  paper.add_option("--seed", a.options.seed, "Of what is random: noise, methods").show_default();
   paper
-      ->add_option(
+      .add_option(
           "--device", a.device,
           "auto: the CPU, and where there is a GPU the paper's method and ours there too; cpu: no GPU; cuda: "
           "it must be there")
-      ->capture_default_str();
-  paper->add_option("--threads", a.options.compute.threads, "CPU threads; 0: one per core")
-      ->check(CLI::Range(0, 256))
-      ->capture_default_str();
-  paper->callback([arguments] { evaluate_the_paper(*arguments); });
+      .show_default();
+  paper.add_threads(a.options.compute.threads);
+  paper.set_action([arguments] { evaluate_the_paper(*arguments); });
 }
 
 }  // namespace emberlock::cli

@@ -212,37 +212,36 @@ Status export_result(const ExportArguments& a, const std::string& program) try {
 
 }  // namespace
 
-void add_export(CLI::App& app) {
+void add_export(const Verb& app) {
   auto arguments = std::make_shared<ExportArguments>();
   ExportArguments& a = *arguments;
-  CLI::App* verb = app.add_subcommand(
+  const Verb verb = app.add_verb(
       "export", "A result's volume, or a sequence's, as files for Blender, Houdini, ParaView and renderers");
-  verb->add_option("RESULT", a.result,
-                   "Folder of reconstruct, also of a sequence (--frames), or a volume.vdb")
-      ->required();
-  verb->add_option("--out", a.out, "Folder for flame.vdb, or flame_0000.vdb and so on")->required();
-  verb->add_option(
+  verb.add_option("RESULT", a.result, "Folder of reconstruct, also of a sequence (--frames), or a volume.vdb")
+      .require();
+  verb.add_option("--out", a.out, "Folder for flame.vdb, or flame_0000.vdb and so on").require();
+  verb.add_option(
           "--format", a.format,
           "vdb: OpenVDB, for Houdini, Blender from 5.0 and others; blender4: OpenVDB for Blender "
           "before 5.0, which draws voxels half an edge later; nvdb: NanoVDB; vti: VTK image data, for "
           "ParaView")
-      ->check(CLI::IsMember(file_formats()))
-      ->type_name("TEXT")
-      ->capture_default_str();
-  verb->add_option_function<std::string>(
+      .check_choices(names_of(file_formats()))
+      .set_type("TEXT")
+      .show_default();
+  verb.add_option_function(
           "--frames",
           [&a](const std::string& text) {
             a.frames = parse_frames(text);
-            if (!a.frames) throw CLI::ValidationError("--frames", "give FIRST:LAST, two frames' numbers");
+            if (!a.frames) throw UsageError("--frames: give FIRST:LAST, two frames' numbers");
           },
           "A:B: of a sequence, those from A to B [all]")
-      ->type_name("TEXT");
-  verb->add_option("--grids", a.grids,
-                   "Names between commas: emission, density, flame, temperature, ... [all that there are]")
-      ->delimiter(',')
-      ->type_name("TEXT");
+      .set_type("TEXT");
+  verb.add_option("--grids", a.grids,
+                  "Names between commas: emission, density, flame, temperature, ... [all that there are]")
+      .split_at_commas()
+      .set_type("TEXT");
   add_key_option(verb, a.key);
-  verb->callback([arguments, &app] {
+  verb.set_action([arguments, app] {
     const std::string version = app.version();
     or_fail(export_result(*arguments, version.empty() ? "emberlock" : version));
   });

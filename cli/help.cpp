@@ -9,6 +9,7 @@
 #include <string_view>
 #include <vector>
 
+#include <CLI/CLI.hpp>
 #include <fmt/format.h>
 
 #include "base/nearest.h"
@@ -179,18 +180,19 @@ std::string help_text(const CLI::App& verb) {
 
 }  // namespace
 
-void style_help(CLI::App& app) { app.formatter(std::make_shared<HelpFormatter>()); }
+void style_help(const Verb& program) { program.app().formatter(std::make_shared<HelpFormatter>()); }
 
-void add_help(CLI::App& app) {
+void add_help(const Verb& program) {
   auto words = std::make_shared<std::vector<std::string>>();
-  CLI::App* verb = app.add_subcommand("help", "Prints this, or the help of a verb");
-  verb->add_option("VERB", *words, "A verb: align, or calibrate cameras");
-  verb->callback([words, &app] { std::printf("%s", help_text(*or_fail(find_verb(app, *words))).c_str()); });
+  const Verb verb = program.add_verb("help", "Prints this, or the help of a verb");
+  verb.add_option("VERB", *words, "A verb: align, or calibrate cameras");
+  verb.set_action(
+      [words, program] { std::printf("%s", help_text(*or_fail(find_verb(program.app(), *words))).c_str()); });
 }
 
-std::string usage_error(const CLI::App& app, const CLI::ParseError& error) {
-  const CLI::App& verb = typed_verb(app);
-  const std::vector<std::string> left = app.remaining(true);
+std::string usage_error(const Verb& program, const UsageError& error) {
+  const CLI::App& verb = typed_verb(program.app());
+  const std::vector<std::string> left = program.app().remaining(true);
   const std::vector<std::string> verbs = names_of_verbs(verb);
   const auto is_option = [](const std::string& word) { return word.size() > 1 && word.front() == '-'; };
   if (!verbs.empty()) {
@@ -203,6 +205,6 @@ std::string usage_error(const CLI::App& app, const CLI::ParseError& error) {
   return fmt::format("{}. {} says how", error.what(), help_command(verb));
 }
 
-std::string help_of_missing_verb(const CLI::App& app) { return help_text(typed_verb(app)); }
+std::string help_of_missing_verb(const Verb& program) { return help_text(typed_verb(program.app())); }
 
 }  // namespace emberlock::cli

@@ -3,20 +3,20 @@
 
 #include <string>
 
-#include <CLI/CLI.hpp>
+#include "cli/command_line.h"
 
 namespace emberlock::cli {
 
 /// Help as it is printed here: verbs in groups, lines wrapped. Before the first verb is added: verbs take it
 /// over.
-void style_help(CLI::App& app);
+void style_help(const Verb& program);
 
 /// Adds `help [VERB...]`.
-void add_help(CLI::App& app);
+void add_help(const Verb& program);
 
 /// What is wrong with a command line that was parsed and refused, with the verb or option that was probably
 /// meant. Empty: a verb is missing, and `help_of_missing_verb` says which there are.
-std::string usage_error(const CLI::App& app, const CLI::ParseError& error);
-std::string help_of_missing_verb(const CLI::App& app);
+std::string usage_error(const Verb& program, const UsageError& error);
+std::string help_of_missing_verb(const Verb& program);
 
 }  // namespace emberlock::cli

@@ -124,43 +124,42 @@ void import(const ImportArguments& arguments) {
 
 }  // namespace
 
-void add_import(CLI::App& app) {
+void add_import(const Verb& app) {
   auto a = std::make_shared<ImportArguments>();
-  CLI::App* verb = app.add_subcommand(
+  const Verb verb = app.add_verb(
       "import",
       "Makes a session of the cameras' video files, folders of numbered pictures, or a transforms.json. "
       "Frames are matched by the strobe that all films show; times.json has each frame's true time.");
-  verb->add_option("folder", a->folder,
-                   "a video file or a subfolder for each camera, whose id is the file's or subfolder's name")
-      ->required();
-  verb->add_option("--out", a->out, "the session's folder, which must not exist or be empty")->required();
-  verb->add_option("--camera", a->cameras,
-                   "ID=NAME: another id for the file or subfolder NAME; may be repeated");
-  CLI::Option* flash_rate = add_clip_options(*verb, a->clip);
-  auto* unsynchronised = verb->add_flag("--unsynchronised", a->unsynchronised,
-                                        "without a strobe: the films' first frames belong together");
-  verb->add_option(
+  verb.add_option("folder", a->folder,
+                  "a video file or a subfolder for each camera, whose id is the file's or subfolder's name")
+      .require();
+  verb.add_option("--out", a->out, "the session's folder, which must not exist or be empty").require();
+  verb.add_option("--camera", a->cameras,
+                  "ID=NAME: another id for the file or subfolder NAME; may be repeated");
+  const Option flash_rate = add_clip_options(verb, a->clip);
+  const Option unsynchronised = verb.add_flag("--unsynchronised", a->unsynchronised,
+                                              "without a strobe: the films' first frames belong together");
+  verb.add_option(
       "--offset", a->offsets,
       "ID=N, without a strobe: frame i + N of this camera belongs to frame i of the others; may be "
       "repeated");
-  flash_rate->excludes(unsynchronised)->excludes(verb->get_option("--offset"));
-  verb->add_option("--strobe", a->strobe, "FROM-TO, seconds of each film that show the strobe [found]");
-  verb->add_option("--flame", a->flame,
-                   "FROM-TO, seconds of the first camera's film to import [the longest part in which no film "
-                   "shows the strobe]");
-  verb->add_option("--rig", a->rig, "rig.json: calibration of the cameras, by their ids");
-  verb->add_flag("--joined", a->joined,
-                 "the files of a camera are one film, even if nothing in them says so");
-  verb->add_flag(
+  flash_rate.exclude(unsynchronised).exclude(verb.find_option("--offset"));
+  verb.add_option("--strobe", a->strobe, "FROM-TO, seconds of each film that show the strobe [found]");
+  verb.add_option("--flame", a->flame,
+                  "FROM-TO, seconds of the first camera's film to import [the longest part in which no film "
+                  "shows the strobe]");
+  verb.add_option("--rig", a->rig, "rig.json: calibration of the cameras, by their ids");
+  verb.add_flag("--joined", a->joined, "the files of a camera are one film, even if nothing in them says so");
+  verb.add_flag(
       "--partial", a->partial,
       "import what is good: leave out films that can't be used, end where one is damaged, and report each");
-  verb->add_flag("--grey", a->grey, "store brightness only");
-  verb->add_option("--encoding", a->encoding,
-                   "ffv1: as in recordings; quick: six times as fast, files a sixth larger")
-      ->check(CLI::IsMember({"quick", "ffv1"}))
-      ->capture_default_str();
-  verb->add_flag("--json", a->json, "the session's import.json on stdout");
-  verb->callback([a] { import(*a); });
+  verb.add_flag("--grey", a->grey, "store brightness only");
+  verb.add_option("--encoding", a->encoding,
+                  "ffv1: as in recordings; quick: six times as fast, files a sixth larger")
+      .check_choices({"quick", "ffv1"})
+      .show_default();
+  verb.add_flag("--json", a->json, "the session's import.json on stdout");
+  verb.set_action([a] { import(*a); });
 }
 
 }  // namespace emberlock::cli

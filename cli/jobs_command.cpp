@@ -38,21 +38,21 @@ void cancel_job(const JobsArguments& arguments) {
 
 }  // namespace
 
-void add_jobs(CLI::App& app) {
+void add_jobs(const Verb& app) {
   auto arguments = std::make_shared<JobsArguments>();
-  CLI::App* verb = app.add_subcommand(
+  const Verb verb = app.add_verb(
       "jobs",
       "Lists the daemon's jobs (salvage, verification, export, reconstruction, ...); `jobs cancel` ends one");
-  add_daemon_options(*verb, arguments->daemon);
-  verb->add_flag("--json", arguments->json, "The jobs (emberlock/v1/jobs.proto), as JSON on one line");
-  verb->require_subcommand(0, 1);
-  CLI::App* cancel =
-      verb->add_subcommand("cancel", "Ends a job. Salvage, compression and repair continue from there later");
-  cancel->add_option("ID", arguments->id, "The job's number, as `emberlock jobs` prints it")->required();
-  add_daemon_options(*cancel, arguments->daemon);
-  cancel->callback([arguments] { cancel_job(*arguments); });
-  verb->callback([arguments, verb] {
-    if (verb->get_subcommands().empty()) list_jobs(*arguments);
+  add_daemon_options(verb, arguments->daemon);
+  verb.add_flag("--json", arguments->json, "The jobs (emberlock/v1/jobs.proto), as JSON on one line");
+  verb.allow_verb();
+  const Verb cancel =
+      verb.add_verb("cancel", "Ends a job. Salvage, compression and repair continue from there later");
+  cancel.add_option("ID", arguments->id, "The job's number, as `emberlock jobs` prints it").require();
+  add_daemon_options(cancel, arguments->daemon);
+  cancel.set_action([arguments] { cancel_job(*arguments); });
+  verb.set_action([arguments, verb] {
+    if (!verb.verb_is_given()) list_jobs(*arguments);
   });
 }
 

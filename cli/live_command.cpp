@@ -159,13 +159,12 @@ void run_live(int fd) {
 
 }  // namespace
 
-void add_reconstruct_live(CLI::App& app) {
+void add_reconstruct_live(const Verb& app) {
   auto fd = std::make_shared<int>(-1);
-  CLI::App* verb =
-      app.add_subcommand("reconstruct-live", "Reconstructs the newest frames of a recording that goes on")
-          ->group("");
-  verb->add_option("--progress-fd", *fd, "Where volumes go: an open descriptor")->required();
-  verb->callback([fd] { run_live(*fd); });
+  const Verb verb =
+      app.add_verb("reconstruct-live", "Reconstructs the newest frames of a recording that goes on").hide();
+  verb.add_option("--progress-fd", *fd, "Where volumes go: an open descriptor").require();
+  verb.set_action([fd] { run_live(*fd); });
 }
 
 }  // namespace emberlock::cli

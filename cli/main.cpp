@@ -43,12 +43,11 @@ int main(int argc, char** argv) {
     return 0;
   }
 #if EMBERLOCK_WITH_DAEMON
-  CLI::App app{"", "emberlock"};
-  app.require_subcommand(1);
-  emberlock::cli::style_help(app);
-  emberlock::cli::add_client(app);
-  if (!app.get_subcommands([&](const CLI::App* verb) { return verb->check_name(first); }).empty())
-    return emberlock::cli::run(app, argc, argv);
+  const emberlock::cli::CommandLine line;
+  line.program().require_verb();
+  emberlock::cli::style_help(line.program());
+  emberlock::cli::add_client(line.program());
+  if (line.program().has_verb(first)) return emberlock::cli::run(line, argc, argv);
 #endif
   return emberlock::cli::hand_on(argv);
 }

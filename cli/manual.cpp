@@ -18,39 +18,40 @@ namespace emberlock::cli {
 namespace {
 
 /// "--size TEXT" in roff.
-std::string roff_option(const CLI::Option& option) {
+std::string roff_option(const OptionWords& option) {
   std::string names;
-  for (const std::string& name : option.get_snames())
+  for (const std::string& name : option.short_names)
     names += (names.empty() ? "" : ", ") + ("\\fB\\-" + roff(name) + "\\fR");
-  for (const std::string& name : option.get_lnames())
+  for (const std::string& name : option.long_names)
     names += (names.empty() ? "" : ", ") + ("\\fB\\-\\-" + roff(name) + "\\fR");
-  if (names.empty()) return "\\fI" + roff(option.get_name(true)) + "\\fR";
-  return takes_value(option) ? names + " \\fI" + roff(option.get_type_name()) + "\\fR" : names;
+  if (names.empty()) return "\\fI" + roff(option.name) + "\\fR";
+  return option.takes_value ? names + " \\fI" + roff(option.type) + "\\fR" : names;
 }
 
-void append_options(const CLI::App& app, std::string& page) {
-  for (const CLI::Option* option : options_of(app)) {
-    page += ".TP\n" + roff_option(*option) + "\n" + roff(option->get_description());
-    if (!option->get_default_str().empty()) page += " Default: " + roff(option->get_default_str()) + ".";
+void append_options(const VerbWords& verb, std::string& page) {
+  for (const OptionWords& option : verb.options) {
+    page += ".TP\n" + roff_option(option) + "\n" + roff(option.description);
+    if (!option.default_text.empty()) page += " Default: " + roff(option.default_text) + ".";
     page += "\n";
   }
 }
 
 }  // namespace
 
-std::string manual_page(const CLI::App& app, std::string_view version) {
+std::string manual_page(const Verb& program, std::string_view version) {
+  const VerbWords tree = describe_tree(program);
   std::string page =
       fmt::format(".TH EMBERLOCK 1 \"\" \"Emberlock {}\" \"User commands\"\n", version) +
       ".SH NAME\nemberlock \\- locks cameras without trigger hardware, films and reconstructs flames\n"
       ".SH SYNOPSIS\n\\fBemberlock\\fR \\fIVERB\\fR [\\fIOPTION\\fR]...\n.SH DESCRIPTION\n" +
-      roff(app.get_description()) + "\n.SH OPTIONS\n";
-  append_options(app, page);
+      roff(tree.description) + "\n.SH OPTIONS\n";
+  append_options(tree, page);
   page += ".SH VERBS\n";
-  visit(app, app.get_name(), [&](const CLI::App& verb, const std::string& path) {
-    if (&verb == &app) return;
-    page += ".SS \"" + roff(path) + "\"\n" + roff(verb.get_description()) + "\n";
-    append_options(verb, page);
-  });
+  for (const VerbWords* verb : list_verbs(tree)) {
+    if (verb == &tree) continue;
+    page += ".SS \"" + roff(verb->path) + "\"\n" + roff(verb->description) + "\n";
+    append_options(*verb, page);
+  }
   page +=
       ".SH EXIT STATUS\n0: done. 1: it failed, or what was checked isn't as it should be. 2: the command "
       "line or an "
@@ -62,33 +63,33 @@ std::string manual_page(const CLI::App& app, std::string_view version) {
   return page;
 }
 
-void add_manual(CLI::App& app, const std::string& version) {
-  static const std::map<std::string, std::string (*)(const CLI::App&)> kShells{
+void add_manual(const Verb& program, const std::string& version) {
+  static const std::map<std::string, std::string (*)(const Verb&)> kShells{
       {"bash", bash_completion}, {"zsh", zsh_completion}, {"fish", fish_completion}};
   auto shell = std::make_shared<std::string>();
-  CLI::App* completion = app.add_subcommand(
+  const Verb completion = program.add_verb(
       "completion",
       "Prints a shell's completion of verbs and options: `source <(emberlock completion bash)`");
-  completion->add_option("SHELL", *shell, "bash, zsh or fish")->required()->check(CLI::IsMember(kShells));
-  completion->callback([shell, &app] { std::printf("%s", kShells.at(*shell)(app).c_str()); });
+  completion.add_option("SHELL", *shell, "bash, zsh or fish").require().check_choices(names_of(kShells));
+  completion.set_action([shell, program] { std::printf("%s", kShells.at(*shell)(program).c_str()); });
 
   auto page = std::make_shared<std::string>();
-  CLI::App* man = app.add_subcommand("man", "Prints a manual page, in roff.")->group("");
-  man->add_option("PAGE", *page, "emberlock or emberlockd.toml")
-      ->required()
+  const Verb man = program.add_verb("man", "Prints a manual page, in roff.").hide();
+  man.add_option("PAGE", *page, "emberlock or emberlockd.toml")
+      .require()
 #if EMBERLOCK_WITH_DRIVERS
-      ->check(CLI::IsMember({"emberlock", "emberlockd.toml"}));
+      .check_choices({"emberlock", "emberlockd.toml"});
 #else
-      ->check(CLI::IsMember({"emberlock"}));
+      .check_choices({"emberlock"});
 #endif
-  man->callback([page, &app, version] {
+  man.set_action([page, program, version] {
 #if EMBERLOCK_WITH_DRIVERS
     if (*page == "emberlockd.toml") {
       std::printf("%s", rig::config_manual(version).c_str());
       return;
     }
 #endif
-    std::printf("%s", manual_page(app, version).c_str());
+    std::printf("%s", manual_page(program, version).c_str());
   });
 }
 

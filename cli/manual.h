@@ -4,15 +4,15 @@
 #include <string>
 #include <string_view>
 
-#include <CLI/CLI.hpp>
+#include "cli/command_line.h"
 
-// A program's description (its CLI::App) in other formats than --help.
+// A program's description in other formats than --help.
 namespace emberlock::cli {
 
 /// The manual page emberlock(1): every verb and option, in roff.
-std::string manual_page(const CLI::App& app, std::string_view version);
+std::string manual_page(const Verb& program, std::string_view version);
 
 /// The hidden verbs `completion SHELL` (completion.h) and `man PAGE`, for the build and for packagers.
-void add_manual(CLI::App& app, const std::string& version);
+void add_manual(const Verb& program, const std::string& version);
 
 }  // namespace emberlock::cli

@@ -74,16 +74,15 @@ Status print_marker(const std::string& words, const std::string& out) {
 
 }  // namespace
 
-void add_marker(CLI::App& app) {
+void add_marker(const Verb& app) {
   struct Arguments {
     std::string marker, out;
   };
   auto arguments = std::make_shared<Arguments>();
-  CLI::App* verb = app.add_subcommand("marker", "Draws a marker or a board for printing, in its size");
-  verb->add_option("MARKER", arguments->marker, "As `emberlock ar --marker`: aruco:4X4_50:0:80mm")
-      ->required();
-  verb->add_option("--out", arguments->out, "An SVG file; one that is there is replaced")->required();
-  verb->callback([arguments] { or_fail(print_marker(arguments->marker, arguments->out)); });
+  const Verb verb = app.add_verb("marker", "Draws a marker or a board for printing, in its size");
+  verb.add_option("MARKER", arguments->marker, "As `emberlock ar --marker`: aruco:4X4_50:0:80mm").require();
+  verb.add_option("--out", arguments->out, "An SVG file; one that is there is replaced").require();
+  verb.set_action([arguments] { or_fail(print_marker(arguments->marker, arguments->out)); });
 }
 
 }  // namespace emberlock::cli

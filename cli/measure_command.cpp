@@ -229,32 +229,29 @@ void measure(const MeasureArguments& arguments) {
 
 }  // namespace
 
-void add_measure(CLI::App& app) {
+void add_measure(const Verb& app) {
   auto arguments = std::make_shared<MeasureArguments>();
   MeasureArguments& a = *arguments;
-  CLI::App* verb = app.add_subcommand(
+  const Verb verb = app.add_verb(
       "measure", "Measures what flames radiate: power, flux on a surface, temperatures, height and volume");
-  verb->add_option(
+  verb.add_option(
           "VOLUMES", a.volumes,
           "Results of `reconstruct --quantity temperature`: folders or volume.vdb, a sequence's in its order")
-      ->required();
-  verb->add_option(
+      .require();
+  verb.add_option(
       "--target", a.target,
       "x,y,z,nx,ny,nz: also the flux on a small surface, at a point (m) and the direction it looks in");
-  verb->add_option("--target-sphere", a.sphere,
-                   "x,y,z,radius (m): also the flux on a black sphere, mean and highest, and the power that "
-                   "it catches; one around the flame catches on its inner side")
-      ->type_name("TEXT");
-  verb->add_option("--up", a.up,
-                   "The world's axis along which height is counted: x, y, z, -x, -y or -z [as the first "
-                   "result's cameras stood, or z]")
-      ->type_name("TEXT");
-  verb->add_option("--out", a.out,
-                   "Folder for measures.csv, and of several volumes measures.html with plots");
-  verb->add_option("--threads", a.threads, "CPU threads; 0: one per core")
-      ->check(CLI::Range(0, 256))
-      ->capture_default_str();
-  verb->callback([arguments] { measure(*arguments); });
+  verb.add_option("--target-sphere", a.sphere,
+                  "x,y,z,radius (m): also the flux on a black sphere, mean and highest, and the power that "
+                  "it catches; one around the flame catches on its inner side")
+      .set_type("TEXT");
+  verb.add_option("--up", a.up,
+                  "The world's axis along which height is counted: x, y, z, -x, -y or -z [as the first "
+                  "result's cameras stood, or z]")
+      .set_type("TEXT");
+  verb.add_option("--out", a.out, "Folder for measures.csv, and of several volumes measures.html with plots");
+  verb.add_threads(a.threads);
+  verb.set_action([arguments] { measure(*arguments); });
 }
 
 }  // namespace emberlock::cli

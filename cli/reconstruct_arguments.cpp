@@ -160,150 +160,147 @@ std::vector<std::filesystem::path> inputs_of(const ReconstructArguments& argumen
   return recon::files_of(arguments.input, options);
 }
 
-void add_solve_options(CLI::App* verb, ReconstructArguments& a) {
-  verb->add_option("--solver", a.solver, "default, or paper (equations 10 and 11 of the paper)")
-      ->capture_default_str();
-  verb->add_option("--seed", a.seed, "Seed of the random numbers in the paper's solver")
-      ->check(CLI::NonNegativeNumber)
-      ->capture_default_str();
-  verb->add_option("--hold-out", a.held_out,
-                   "Views, counted from 0, that aren't used; the result is scored on them: i,j,...")
-      ->delimiter(',');
-  verb->add_option("--effects", a.effects,
-                   "auto, none, or a list such as extinction=32.8 (1/m) or light=found [auto]");
-  verb->add_option("--iterations", a.iterations, "Most iterations [the solver's own rule]")
-      ->check(CLI::Range(1, 1000000));
-  verb->add_option("--views", a.views, "Use so many of the input views, spread as far as possible [all]")
-      ->check(CLI::Range(1, 64));
-  verb->add_flag("--keep-poses", a.keep_poses,
-                 "Use the given poses of the cameras, even if the flame's outlines don't meet");
-  verb->add_option("--step", a.step, "Longest step along a ray, in voxel edges")
-      ->check(CLI::Range(0.05, 4.0))
-      ->capture_default_str();
-  verb->add_option("--precision", a.precision, "float32 or float64")->capture_default_str();
-  verb->add_option("--threads", a.threads, "CPU threads; 0: one per core. The result doesn't depend on them")
-      ->check(CLI::Range(0, 256))
-      ->capture_default_str();
-  verb->add_option("--device", a.device, "auto, cpu, cuda, or cuda:N: the GPU of this number")
-      ->capture_default_str();
-  verb->add_option("--budget", a.budget,
-                   "Time limit in seconds, without loading and writing; sets the options that aren't given")
-      ->check(CLI::PositiveNumber);
-  verb->add_option("--target-rmse", a.target_rmse,
-                   "Held-out error to reach, grey levels; sets the options that aren't given")
-      ->check(CLI::PositiveNumber);
+void add_solve_options(const Verb& verb, ReconstructArguments& a) {
+  verb.add_option("--solver", a.solver, "default, or paper (equations 10 and 11 of the paper)")
+      .show_default();
+  verb.add_option("--seed", a.seed, "Seed of the random numbers in the paper's solver")
+      .check_not_negative()
+      .show_default();
+  verb.add_option("--hold-out", a.held_out,
+                  "Views, counted from 0, that aren't used; the result is scored on them: i,j,...")
+      .split_at_commas();
+  verb.add_option("--effects", a.effects,
+                  "auto, none, or a list such as extinction=32.8 (1/m) or light=found [auto]");
+  verb.add_option("--iterations", a.iterations, "Most iterations [the solver's own rule]")
+      .check_range(1, 1000000);
+  verb.add_option("--views", a.views, "Use so many of the input views, spread as far as possible [all]")
+      .check_range(1, 64);
+  verb.add_flag("--keep-poses", a.keep_poses,
+                "Use the given poses of the cameras, even if the flame's outlines don't meet");
+  verb.add_option("--step", a.step, "Longest step along a ray, in voxel edges")
+      .check_range(0.05, 4.0)
+      .show_default();
+  verb.add_option("--precision", a.precision, "float32 or float64").show_default();
+  verb.add_option("--threads", a.threads, "CPU threads; 0: one per core. The result doesn't depend on them")
+      .check_range(0, 256)
+      .show_default();
+  verb.add_device(a.device);
+  verb.add_option("--budget", a.budget,
+                  "Time limit in seconds, without loading and writing; sets the options that aren't given")
+      .check_positive();
+  verb.add_option("--target-rmse", a.target_rmse,
+                  "Held-out error to reach, grey levels; sets the options that aren't given")
+      .check_positive();
 }
 
-void add_quantity_options(CLI::App* verb, ReconstructArguments& a) {
-  CLI::Option* quantity =
-      verb->add_option("--quantity", a.quantity,
-                       "colour, or temperature: also the grids temperature and temperature_sigma, in K")
-          ->check(CLI::IsMember({"colour", "temperature"}))
-          ->capture_default_str();
-  verb->add_option(
+void add_quantity_options(const Verb& verb, ReconstructArguments& a) {
+  const Option quantity =
+      verb.add_option("--quantity", a.quantity,
+                      "colour, or temperature: also the grids temperature and temperature_sigma, in K")
+          .check_choices({"colour", "temperature"})
+          .show_default();
+  verb.add_option(
           "--response", a.response,
           "The camera's spectral response, a response.json of `calibrate colour --black-body` [the input's; "
           "else that of a camera that shows linear sRGB]")
-      ->needs(quantity);
-  verb->add_option("--emitter", a.emitter,
-                   "What glows: grey, soot (not grey), or paper (green alone, constant opacity) [read as "
-                   "grey, and what soot would tell is part of each voxel's error]")
-      ->check(CLI::IsMember({"grey", "soot", "paper"}))
-      ->needs(quantity);
-  verb->add_option(
+      .need(quantity);
+  verb.add_option("--emitter", a.emitter,
+                  "What glows: grey, soot (not grey), or paper (green alone, constant opacity) [read as "
+                  "grey, and what soot would tell is part of each voxel's error]")
+      .check_choices({"grey", "soot", "paper"})
+      .need(quantity);
+  verb.add_option(
           "--lines", a.lines,
           "What shines in lines beside it, at most two between commas: sodium, potassium, lithium, ch, c2, "
           "cucl, cuoh, bo2; or auto, the one that best explains what no black body does. Also a grid "
           "line_NAME: its share of the light")
-      ->needs(quantity);
-  verb->add_flag("--errors", a.errors,
-                 "Also the grids emission_sigma and density_sigma, by solving again without each of up to "
-                 "ten views, and emission_noise and density_noise, what of it noise makes");
+      .need(quantity);
+  verb.add_flag("--errors", a.errors,
+                "Also the grids emission_sigma and density_sigma, by solving again without each of up to "
+                "ten views, and emission_noise and density_noise, what of it noise makes");
 }
 
-void add_volume_options(CLI::App* verb, ReconstructArguments& a) {
-  verb->add_option(
+void add_volume_options(const Verb& verb, ReconstructArguments& a) {
+  verb.add_option(
       "--rig", a.rig,
       "Sessions only: rig.json of `calibrate cameras`, used instead of the session's calibration");
-  verb->add_option("--box", a.box,
-                   "cx,cy,cz,sx,sy,sz: the volume's centre and size in metres [the input's, or found]");
-  verb->add_option(
+  verb.add_option("--box", a.box,
+                  "cx,cy,cz,sx,sy,sz: the volume's centre and size in metres [the input's, or found]");
+  verb.add_option(
       "--voxels", a.voxels,
       "Voxels along the longest edge, 1 to 1024, or paper: two for three pixels [the knee of time "
       "against error, measured on this machine; the paper's solver: two for three pixels, at most "
       "256]");
 }
 
-void add_range_options(CLI::App* verb, ReconstructArguments& a) {
-  verb->add_option_function<std::string>(
+void add_range_options(const Verb& verb, ReconstructArguments& a) {
+  verb.add_option_function(
       "--frames",
       [&a](const std::string& text) {
         const auto both = parse_frames(text);
-        if (!both) throw CLI::ValidationError("--frames", "give FIRST:LAST, two frames' numbers");
+        if (!both) throw UsageError("--frames: give FIRST:LAST, two frames' numbers");
         std::tie(a.frame, a.last_frame) = *both;
         a.range = "--frames " + text;
       },
       "A:B: the session's frames from A to B, numbers of the first camera's");
-  verb->add_option("--every", a.every, "With --frames: each frame of so many")
-      ->check(CLI::Range(1, 1000000))
-      ->capture_default_str();
+  verb.add_option("--every", a.every, "With --frames: each frame of so many")
+      .check_range(1, 1000000)
+      .show_default();
 }
 
-void add_frame_options(CLI::App* verb, ReconstructArguments& a) {
-  verb->add_option("--frame", a.frame,
-                   "Sessions only: number of the first camera's frame [the middle one that all cameras have]")
-      ->check(CLI::NonNegativeNumber);
-  verb->add_option(
+void add_frame_options(const Verb& verb, ReconstructArguments& a) {
+  verb.add_option("--frame", a.frame,
+                  "Sessions only: number of the first camera's frame [the middle one that all cameras have]")
+      .check_not_negative();
+  verb.add_option(
           "--last-frame", a.last_frame,
           "Sessions only: reconstructs each frame, from --frame to this one, each into "
           "OUT/frame-N and started from where the one before ended, and tells of all over time in "
           "OUT/sequence. The same command goes on where it was interrupted, and tries again what failed")
-      ->check(CLI::NonNegativeNumber)
-      ->needs("--frame");
+      .check_not_negative()
+      .need("--frame");
   add_range_options(verb, a);
-  verb->get_option("--frames")
-      ->description("A:B: --frame A --last-frame B")
-      ->excludes("--frame")
-      ->excludes("--last-frame");
-  verb->add_option(
-          "--instants", a.instants,
-          "With --frames, of a session whose cameras are staggered (`emberlock align --stagger`): so "
-          "many volumes a frame period, each view used at its own instant. All numbers but A and B "
-          "count instants then, frame n being n times so many")
-      ->check(CLI::Range(1, 64))
-      ->capture_default_str();
-  verb->add_flag("--cold", a.cold, "With --frames: each frame as if it were alone, from darkness");
-  verb->add_option("--at-once", a.at_once,
-                   "With --frames: so many frames at work, each as if it were alone, "
-                   "with its share of --threads and "
-                   "memory of its own. The results don't depend on it; more finish "
-                   "sooner on many cores and on a GPU")
-      ->check(CLI::Range(1, 64))
-      ->capture_default_str();
+  verb.find_option("--frames")
+      .set_description("A:B: --frame A --last-frame B")
+      .exclude("--frame")
+      .exclude("--last-frame");
+  verb.add_option("--instants", a.instants,
+                  "With --frames, of a session whose cameras are staggered (`emberlock align --stagger`): so "
+                  "many volumes a frame period, each view used at its own instant. All numbers but A and B "
+                  "count instants then, frame n being n times so many")
+      .check_range(1, 64)
+      .show_default();
+  verb.add_flag("--cold", a.cold, "With --frames: each frame as if it were alone, from darkness");
+  verb.add_option("--at-once", a.at_once,
+                  "With --frames: so many frames at work, each as if it were alone, "
+                  "with its share of --threads and "
+                  "memory of its own. The results don't depend on it; more finish "
+                  "sooner on many cores and on a GPU")
+      .check_range(1, 64)
+      .show_default();
 }
 
-void add_picture_options(CLI::App* verb, ReconstructArguments& a) {
-  verb->add_option(
-          "--threshold", a.threshold,
-          "Grey level above which a pixel shows flame [each picture's noise; the paper's solver: 30]")
-      ->check(CLI::Range(0.0, 255.0));
-  verb->add_option("--shrink", a.shrink,
-                   "Pictures of a so-and-so-many-th of their size, by means of pixels: where they are larger "
-                   "than the voxels need")
-      ->check(CLI::Range(1, 64))
-      ->capture_default_str();
-  verb->add_option("--background", a.background,
-                   "Sessions only: auto (each camera's first or last frames, if they show no flame), level "
-                   "(of the picture's darker half), or frames without flame: FIRST-LAST")
-      ->capture_default_str();
-  verb->add_option("--smear", a.smear,
-                   "CCDs of sessions only: auto (measured from rows without flame), off, or the share of "
-                   "every row's light, with :above or :below for rows on one side")
-      ->capture_default_str();
-  verb->add_option("--demosaic", a.demosaic,
-                   "bilinear: least noise and error on flames; gradient: for pictures with sharp edges")
-      ->check(CLI::IsMember({"bilinear", "gradient"}))
-      ->capture_default_str();
+void add_picture_options(const Verb& verb, ReconstructArguments& a) {
+  verb.add_option("--threshold", a.threshold,
+                  "Grey level above which a pixel shows flame [each picture's noise; the paper's solver: 30]")
+      .check_range(0.0, 255.0);
+  verb.add_option("--shrink", a.shrink,
+                  "Pictures of a so-and-so-many-th of their size, by means of pixels: where they are larger "
+                  "than the voxels need")
+      .check_range(1, 64)
+      .show_default();
+  verb.add_option("--background", a.background,
+                  "Sessions only: auto (each camera's first or last frames, if they show no flame), level "
+                  "(of the picture's darker half), or frames without flame: FIRST-LAST")
+      .show_default();
+  verb.add_option("--smear", a.smear,
+                  "CCDs of sessions only: auto (measured from rows without flame), off, or the share of "
+                  "every row's light, with :above or :below for rows on one side")
+      .show_default();
+  verb.add_option("--demosaic", a.demosaic,
+                  "bilinear: least noise and error on flames; gradient: for pictures with sharp edges")
+      .check_choices({"bilinear", "gradient"})
+      .show_default();
 }
 
 }  // namespace emberlock::cli

@@ -76,16 +76,16 @@ Result<recon::Scene> load_views(const ReconstructArguments& arguments, const Pro
 std::vector<std::filesystem::path> inputs_of(const ReconstructArguments& arguments);
 
 /// Adds the options for solving.
-void add_solve_options(CLI::App* verb, ReconstructArguments& a);
+void add_solve_options(const Verb& verb, ReconstructArguments& a);
 /// Adds the options for what is measured in the volume.
-void add_quantity_options(CLI::App* verb, ReconstructArguments& a);
+void add_quantity_options(const Verb& verb, ReconstructArguments& a);
 /// Adds the options for the volume's place and its voxels.
-void add_volume_options(CLI::App* verb, ReconstructArguments& a);
+void add_volume_options(const Verb& verb, ReconstructArguments& a);
 /// Adds the options for choosing a session's frames.
-void add_frame_options(CLI::App* verb, ReconstructArguments& a);
+void add_frame_options(const Verb& verb, ReconstructArguments& a);
 /// Adds --frames A:B alone, and --every.
-void add_range_options(CLI::App* verb, ReconstructArguments& a);
+void add_range_options(const Verb& verb, ReconstructArguments& a);
 /// Adds the options for converting pictures to radiance.
-void add_picture_options(CLI::App* verb, ReconstructArguments& a);
+void add_picture_options(const Verb& verb, ReconstructArguments& a);
 
 }  // namespace emberlock::cli

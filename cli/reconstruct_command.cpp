@@ -79,18 +79,18 @@ Status plan_files(const ReconstructArguments& arguments) {
 }
 
 /// The options that the daemon accepts; the others are in its configuration.
-DaemonReconstruction asked_of_daemon(const ReconstructArguments& arguments, const CLI::App& verb) {
+DaemonReconstruction asked_of_daemon(const ReconstructArguments& arguments, const Verb& verb) {
   static const std::set<std::string> kAskable = {"input",      "--cancel",     "--json",   "--frame",
                                                  "--frames",   "--last-frame", "--every",  "--budget",
                                                  "--voxels",   "--hold-out",   "--device", "--quantity",
                                                  "--response", "--emitter",    "--lines",  "--errors"};
-  for (const CLI::Option* option : verb.get_options()) {
-    if (option->count() > 0 && !is_daemon_option(*option) && kAskable.count(option->get_name()) == 0) {
-      fail({ErrorKind::bad_input, "can't be used with --daemon", option->get_name(),
+  for (const Option& option : verb.given_options()) {
+    if (!is_daemon_option(option) && kAskable.count(option.name()) == 0) {
+      fail({ErrorKind::bad_input, "can't be used with --daemon", option.name(),
             "Leave it away, or reconstruct here, without --daemon"});
     }
   }
-  if (arguments.input.empty() && !arguments.by_daemon.cancel) throw CLI::RequiredError("input");
+  if (arguments.input.empty() && !arguments.by_daemon.cancel) throw UsageError("input is required");
   DaemonReconstruction wanted = arguments.by_daemon;
   v1::ReconstructRequest& request = wanted.request;
   request.set_session(arguments.input);
@@ -108,10 +108,10 @@ DaemonReconstruction asked_of_daemon(const ReconstructArguments& arguments, cons
   }
   request.set_voxels(static_cast<std::uint32_t>(voxels.value_or(0)));
   for (const int view : arguments.held_out) request.add_hold_out(static_cast<std::uint32_t>(view));
-  if (verb.count("--device") > 0) request.set_device(arguments.device);
-  if (verb.count("--quantity") > 0) request.set_quantity(arguments.quantity);
-  if (verb.count("--emitter") > 0) request.set_emitter(arguments.emitter);
-  if (verb.count("--lines") > 0) request.set_lines(arguments.lines);
+  if (verb.is_given("--device")) request.set_device(arguments.device);
+  if (verb.is_given("--quantity")) request.set_quantity(arguments.quantity);
+  if (verb.is_given("--emitter")) request.set_emitter(arguments.emitter);
+  if (verb.is_given("--lines")) request.set_lines(arguments.lines);
   if (options.temperature && options.temperature->response)
     *request.mutable_response() = recon::message_of(*options.temperature->response);
   request.set_errors(arguments.errors);
@@ -154,9 +154,9 @@ void reconstruct_range(const ReconstructArguments& arguments) {
 }
 
 void reconstruct_command(const ReconstructArguments& arguments) {
-  if (arguments.input.empty()) throw CLI::RequiredError("input");
+  if (arguments.input.empty()) throw UsageError("input is required");
   if (!arguments.plan.empty()) return or_fail(plan_files(arguments));
-  if (arguments.out.empty()) throw CLI::RequiredError("--out");
+  if (arguments.out.empty()) throw UsageError("--out is required");
   if (!arguments.progress_fd) {
     const Interrupt interrupt;
     if (arguments.last_frame) return reconstruct_range(arguments);
@@ -175,49 +175,49 @@ void reconstruct_command(const ReconstructArguments& arguments) {
 
 }  // namespace
 
-void add_reconstruct(CLI::App& app) {
+void add_reconstruct(const Verb& app) {
   auto arguments = std::make_shared<ReconstructArguments>();
-  CLI::App* verb = app.add_subcommand(
-      "reconstruct", "Reconstructs the flame's volume from calibrated pictures or a session");
+  const Verb verb =
+      app.add_verb("reconstruct", "Reconstructs the flame's volume from calibrated pictures or a session");
   ReconstructArguments& a = *arguments;
-  verb->add_option(
+  verb.add_option(
       "input", a.input,
       "transforms.json (NeRF / instant-ngp convention), or a recorded session's folder; with --daemon a "
       "session's name");
-  verb->add_option("--out", a.out, "Folder for volume.vdb, views/, report.json and the page report.html");
-  verb->add_option("--plan", a.plan,
-                   "Reconstruct nothing; draw the box and the voxels on the pictures, in this folder, and "
-                   "estimate the time of a run");
+  verb.add_option("--out", a.out, "Folder for volume.vdb, views/, report.json and the page report.html");
+  verb.add_option("--plan", a.plan,
+                  "Reconstruct nothing; draw the box and the voxels on the pictures, in this folder, and "
+                  "estimate the time of a run");
   add_volume_options(verb, a);
   add_solve_options(verb, a);
   add_frame_options(verb, a);
   add_picture_options(verb, a);
   add_quantity_options(verb, a);
   add_certificate_options(verb, a.certificate);
-  verb->add_option("--progress-fd", a.progress_fd,
-                   "For programs: write progress, every iteration and the result to this descriptor "
-                   "(emberlock/v1/child.proto), nothing to stdout; end when the parent ends")
-      ->check(CLI::NonNegativeNumber);
-  CLI::Option* by_daemon = add_daemon_options(*verb, a.by_daemon.daemon);
-  by_daemon->description("Let emberlockd reconstruct its session of this name: unix:PATH or HOST:PORT")
-      ->expected(0, 1)
-      ->default_str(a.by_daemon.daemon.address);
-  verb->add_flag("--cancel", a.by_daemon.cancel, "With --daemon: cancel the running reconstruction")
-      ->needs(by_daemon);
-  verb->add_flag("--json", a.by_daemon.json,
-                 "report.json on stdout; with --daemon an Iteration (of several frames, a SequenceFrame) per "
-                 "line, then ReconstructionStatus (emberlock/v1/status.proto)")
-      ->excludes("--plan")
-      ->excludes("--progress-fd");
+  verb.add_option("--progress-fd", a.progress_fd,
+                  "For programs: write progress, every iteration and the result to this descriptor "
+                  "(emberlock/v1/child.proto), nothing to stdout; end when the parent ends")
+      .check_not_negative();
+  const Option by_daemon = add_daemon_options(verb, a.by_daemon.daemon);
+  by_daemon.set_description("Let emberlockd reconstruct its session of this name: unix:PATH or HOST:PORT")
+      .make_value_optional()
+      .set_default_text(a.by_daemon.daemon.address);
+  verb.add_flag("--cancel", a.by_daemon.cancel, "With --daemon: cancel the running reconstruction")
+      .need(by_daemon);
+  verb.add_flag("--json", a.by_daemon.json,
+                "report.json on stdout; with --daemon an Iteration (of several frames, a SequenceFrame) per "
+                "line, then ReconstructionStatus (emberlock/v1/status.proto)")
+      .exclude("--plan")
+      .exclude("--progress-fd");
   for (const char* range : {"--last-frame", "--frames"})
-    verb->get_option(range)->excludes("--plan")->excludes("--progress-fd");
-  verb->callback([arguments, verb, by_daemon, &app] {
+    verb.find_option(range).exclude("--plan").exclude("--progress-fd");
+  verb.set_action([arguments, verb, by_daemon, app] {
     arguments->certificate.program = app.version();
     for (const char* option : {"--every", "--cold", "--at-once", "--instants"})
-      if (verb->count(option) > 0 && !arguments->last_frame)
-        throw CLI::RequiresError(option, "--frames or --last-frame");
-    if (by_daemon->count() == 0) return reconstruct_command(*arguments);
-    reconstruct_by_daemon(asked_of_daemon(*arguments, *verb));
+      if (verb.is_given(option) && !arguments->last_frame)
+        throw UsageError(std::string(option) + " requires --frames or --last-frame");
+    if (!by_daemon.is_given()) return reconstruct_command(*arguments);
+    reconstruct_by_daemon(asked_of_daemon(*arguments, verb));
   });
 }
 

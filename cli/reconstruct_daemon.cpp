@@ -58,7 +58,7 @@ void conclude(const v1::ReconstructionStatus& status, bool json) {
   if (status.state() == State::DONE) return;
   std::fprintf(stderr, "emberlock: %s: %s\n", status.session().c_str(),
                status.error().empty() ? status.doing().c_str() : status.error().c_str());
-  throw CLI::RuntimeError(1);
+  throw Exit(1);
 }
 
 }  // namespace
@@ -90,7 +90,7 @@ void reconstruct_by_daemon(const DaemonReconstruction& wanted) {
   if (last.state() != State::RUNNING) return conclude(last, wanted.json);
   if (Interrupt::asked()) {
     std::fprintf(stderr, "the daemon goes on; `emberlock reconstruct --cancel --daemon` ends it\n");
-    throw CLI::RuntimeError(1);
+    throw Exit(1);
   }
   leave(client, {ErrorKind::io, "the daemon ended before it was done"});
 }

@@ -54,7 +54,7 @@ class Progressing {
       if (!json_) std::printf("%s\n", part_line(part).c_str());
     if (recording.state() == v1::RecordingStatus::FAILED ||
         std::any_of(hosts.begin(), hosts.end(), is_wanting))
-      throw CLI::RuntimeError(1);
+      throw Exit(1);
   }
 
  private:
@@ -120,7 +120,7 @@ void renew_for(Client& client, double seconds) {
     return status.revision() <= before.revision() || status.phase() == v1::ALIGNING;
   };
   or_leave(client, client.watch_status(renewed, Interrupt::asked));
-  if (Interrupt::asked()) throw CLI::RuntimeError(1);
+  if (Interrupt::asked()) throw Exit(1);
   if (now.phase() == v1::LOCKED)
     std::fprintf(stderr, "Renewed: %s.\n", lock_in_words(now.alignment()).c_str());
 }
@@ -147,46 +147,47 @@ void record(const RecordArguments& arguments) {
 
 }  // namespace
 
-void add_record(CLI::App& app) {
+void add_record(const Verb& app) {
   auto arguments = std::make_shared<RecordArguments>();
-  CLI::App* verb = app.add_subcommand(
+  const Verb verb = app.add_verb(
       "record", "Records all cameras until Ctrl-C or --stop, and says whether every frame is accounted for");
   RecordArguments& a = *arguments;
-  add_daemon_options(*verb, a.daemon);
-  verb->add_option("name", a.name, "Name of the session [the time]");
-  auto* seconds =
-      verb->add_option("--seconds", a.seconds, "End after so many seconds")->check(CLI::PositiveNumber);
-  auto* unlocked = verb->add_flag("--unlocked", a.unlocked,
-                                  "Record even if the cameras aren't locked, or may not be for so long");
-  verb->add_flag("--no-renewal", a.no_renewal,
-                 "Refuse --seconds for which the lock isn't sure to hold, instead of renewing it first")
-      ->needs(seconds);
-  auto* reconstruct =
-      verb->add_flag("--reconstruct", a.reconstruct, "Reconstruct the session when it is finished");
-  auto* live = verb->add_flag("--live", a.live,
-                              "Make volumes of the newest frames while it is recorded, for the console and "
-                              "`emberlock watch`, with what the recording leaves of the machine");
-  verb->add_option("--every", a.every,
-                   "With --live: of the first camera's frames each of so many alone [the newest, as often as "
-                   "the machine can]")
-      ->check(CLI::Range(1U, 1000000U))
-      ->needs(live);
-  verb->add_option("--voxels", a.voxels,
-                   "With --live: voxels along the longest edge [as many as the machine holds, by what the "
-                   "first volumes take]")
-      ->check(CLI::Range(8U, 1024U))
-      ->needs(live);
-  auto* purpose = verb->add_option("--purpose", a.purpose,
-                                   "Purpose of the recording; \"alignment\": of the flashing strobe")
-                      ->capture_default_str();
-  verb->add_flag("--stop", a.stop, "End the running recording")
-      ->excludes(seconds)
-      ->excludes(unlocked)
-      ->excludes(reconstruct)
-      ->excludes(live)
-      ->excludes(purpose);
-  verb->add_flag("--json", a.json, "RecordingStatus of emberlock/v1/status.proto, a line per change");
-  verb->callback([arguments] { record(*arguments); });
+  add_daemon_options(verb, a.daemon);
+  verb.add_option("name", a.name, "Name of the session [the time]");
+  const Option seconds =
+      verb.add_option("--seconds", a.seconds, "End after so many seconds").check_positive();
+  const Option unlocked = verb.add_flag(
+      "--unlocked", a.unlocked, "Record even if the cameras aren't locked, or may not be for so long");
+  verb.add_flag("--no-renewal", a.no_renewal,
+                "Refuse --seconds for which the lock isn't sure to hold, instead of renewing it first")
+      .need(seconds);
+  const Option reconstruct =
+      verb.add_flag("--reconstruct", a.reconstruct, "Reconstruct the session when it is finished");
+  const Option live =
+      verb.add_flag("--live", a.live,
+                    "Make volumes of the newest frames while it is recorded, for the console and "
+                    "`emberlock watch`, with what the recording leaves of the machine");
+  verb.add_option("--every", a.every,
+                  "With --live: of the first camera's frames each of so many alone [the newest, as often as "
+                  "the machine can]")
+      .check_range(1U, 1000000U)
+      .need(live);
+  verb.add_option("--voxels", a.voxels,
+                  "With --live: voxels along the longest edge [as many as the machine holds, by what the "
+                  "first volumes take]")
+      .check_range(8U, 1024U)
+      .need(live);
+  const Option purpose = verb.add_option("--purpose", a.purpose,
+                                         "Purpose of the recording; \"alignment\": of the flashing strobe")
+                             .show_default();
+  verb.add_flag("--stop", a.stop, "End the running recording")
+      .exclude(seconds)
+      .exclude(unlocked)
+      .exclude(reconstruct)
+      .exclude(live)
+      .exclude(purpose);
+  verb.add_flag("--json", a.json, "RecordingStatus of emberlock/v1/status.proto, a line per change");
+  verb.set_action([arguments] { record(*arguments); });
 }
 
 }  // namespace emberlock::cli

@@ -195,7 +195,7 @@ Status render_all(const RenderArguments& a, const RenderSome& render_some,
 }
 
 /// Options that would change nothing are refused.
-Status check_used(const RenderArguments& a, const CLI::App& verb) {
+Status check_used(const RenderArguments& a, const Verb& verb) {
   const bool one = !a.camera.empty();
   const bool along = !one && a.path == "cameras";
   const bool around = !one && !along;
@@ -206,7 +206,7 @@ Status check_used(const RenderArguments& a, const CLI::App& verb) {
       {"--rate", a.format.video()}, {"--brightness", !a.kelvin()},
       {"--light", !a.kelvin()},     {"--transparent", a.format.format == "png"}};
   for (const auto& [name, applies] : used)
-    if (!applies && verb.count(name) > 0)
+    if (!applies && verb.is_given(name))
       return Error{ErrorKind::bad_input, "changes nothing here", name, "Leave it away"};
   return {};
 }
@@ -242,7 +242,7 @@ void print_lighting(const recon::Lighting& lighting) {
     if (!words.empty()) std::printf("%-16s %s\n", name, words.c_str());
 }
 
-Status render(const RenderArguments& a, const CLI::App& verb) try {
+Status render(const RenderArguments& a, const Verb& verb) try {
   EMBERLOCK_ASSIGN_OR_RETURN(const ImageSize size, parse_image_size(a.image));
   EMBERLOCK_RETURN_IF_ERROR(check_used(a, verb));
   EMBERLOCK_RETURN_IF_ERROR(check(a, size));
@@ -286,65 +286,58 @@ Status render(const RenderArguments& a, const CLI::App& verb) try {
   return Error{ErrorKind::bad_input, "not enough memory", "--image", "Give smaller pictures"};
 }
 
-void add_path_options(CLI::App& verb, RenderArguments& a) {
-  CLI::Option* path =
+void add_path_options(const Verb& verb, RenderArguments& a) {
+  const Option path =
       verb.add_option("--path", a.path, "orbit: once around the middle; cameras: through those that filmed")
-          ->check(CLI::IsMember({"orbit", "cameras"}))
-          ->capture_default_str();
-  verb.add_option("--camera", a.camera, "x,y,z (m): one picture from there")
-      ->type_name("TEXT")
-      ->excludes(path);
+          .check_choices({"orbit", "cameras"})
+          .show_default();
+  verb.add_option("--camera", a.camera, "x,y,z (m): one picture from there").set_type("TEXT").exclude(path);
   verb.add_option("--look-at", a.look_at,
                   "x,y,z (m): what cameras look at and move around [the box's middle]")
-      ->type_name("TEXT");
+      .set_type("TEXT");
   verb.add_option("--input", a.input,
                   "Session or transforms.json whose cameras --path cameras follows [what was reconstructed]");
   verb.add_option("--rig", a.rig, "rig.json that stands before a session's own calibration");
-  verb.add_option("--frames", a.frames, "Along the path")
-      ->check(CLI::Range(1, 100000))
-      ->capture_default_str();
+  verb.add_option("--frames", a.frames, "Along the path").check_range(1, 100000).show_default();
   verb.add_option("--elevation", a.elevation_degrees, "Of an orbit, degrees above the horizon")
-      ->capture_default_str();
+      .show_default();
   verb.add_option("--distance", a.distance, "Of an orbit, m [as far as the whole box just fits]");
   verb.add_option("--up", a.up,
                   "The world's axis that points up: x, y, z, -x, -y or -z [as the cameras stood, or z]")
-      ->type_name("TEXT");
+      .set_type("TEXT");
 }
 
 }  // namespace
 
-void add_render(CLI::App& app) {
+void add_render(const Verb& app) {
   auto arguments = std::make_shared<RenderArguments>();
   RenderArguments& a = *arguments;
-  CLI::App* verb = app.add_subcommand(
+  const Verb verb = app.add_verb(
       "render", "Pictures or a video of a result from any place or path, as colours or temperatures");
-  verb->add_option("RESULT", a.result, "Folder of reconstruct, or a volume.vdb")->required();
-  verb->add_option("--out", a.out, "Folder for frame-0000.png and so on, or for the video")->required();
-  add_path_options(*verb, a);
-  verb->add_option("--image", a.image, "Size of the pictures")->capture_default_str();
-  verb->add_option("--quantity", a.quantity,
-                   "colour, or temperature: each pixel's mean along its ray, weighted by the light")
-      ->check(CLI::IsMember({"colour", "temperature"}))
-      ->capture_default_str();
-  verb->add_option(
+  verb.add_option("RESULT", a.result, "Folder of reconstruct, or a volume.vdb").require();
+  verb.add_option("--out", a.out, "Folder for frame-0000.png and so on, or for the video").require();
+  add_path_options(verb, a);
+  verb.add_option("--image", a.image, "Size of the pictures").show_default();
+  verb.add_option("--quantity", a.quantity,
+                  "colour, or temperature: each pixel's mean along its ray, weighted by the light")
+      .check_choices({"colour", "temperature"})
+      .show_default();
+  verb.add_option(
           "--format", a.format.format,
           "png; exr: 32 bits, R, G, B and the opacity A, or T in K; mp4: for any player; ffv1: lossless, "
           "in Matroska")
-      ->check(CLI::IsMember({"png", "exr", "mp4", "ffv1"}))
-      ->capture_default_str();
-  verb->add_option("--light", a.light,
-                   "Of a result of --effects light=...: another light in that one's place, as bright: none, "
-                   "even, distant:x=X:y=Y:z=Z (towards it) or nearby:x=X:y=Y:z=Z (m)")
-      ->type_name("TEXT");
-  verb->add_flag("--transparent", a.transparent, "PNG before nothing instead of black; EXR always is");
-  verb->add_option("--brightness", a.brightness, "Factor of the colours")->capture_default_str();
-  verb->add_option("--rate", a.format.rate, "Of a video, frames a second")->capture_default_str();
-  verb->add_option("--device", a.device, "auto, cpu, cuda, or cuda:N: the GPU of this number")
-      ->capture_default_str();
-  verb->add_option("--threads", a.threads, "CPU threads; 0: one per core")
-      ->check(CLI::Range(0, 256))
-      ->capture_default_str();
-  verb->callback([arguments, verb] { or_fail(render(*arguments, *verb)); });
+      .check_choices({"png", "exr", "mp4", "ffv1"})
+      .show_default();
+  verb.add_option("--light", a.light,
+                  "Of a result of --effects light=...: another light in that one's place, as bright: none, "
+                  "even, distant:x=X:y=Y:z=Z (towards it) or nearby:x=X:y=Y:z=Z (m)")
+      .set_type("TEXT");
+  verb.add_flag("--transparent", a.transparent, "PNG before nothing instead of black; EXR always is");
+  verb.add_option("--brightness", a.brightness, "Factor of the colours").show_default();
+  verb.add_option("--rate", a.format.rate, "Of a video, frames a second").show_default();
+  verb.add_device(a.device);
+  verb.add_threads(a.threads);
+  verb.set_action([arguments, verb] { or_fail(render(*arguments, verb)); });
 }
 
 }  // namespace emberlock::cli

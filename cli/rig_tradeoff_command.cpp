@@ -78,61 +78,57 @@ void tradeoff_rig(const RigArguments& arguments) {
                       tradeoff.points[tradeoff.best].frame.error)});
 }
 
-void add_lists(CLI::App& verb, RigArguments& a) {
+void add_lists(const Verb& verb, RigArguments& a) {
   evaluate::RigTradeoffOptions& o = a.options;
   verb.add_option("--cameras", o.cameras, "Numbers of cameras, ascending: i,j,...")
-      ->delimiter(',')
-      ->default_str("4,6,8,12,16");
+      .split_at_commas()
+      .set_default_text("4,6,8,12,16");
   verb.add_option("--sizes", a.sizes, "Pictures, ascending: WxH,... [160x120,320x240,640x480]")
-      ->delimiter(',');
+      .split_at_commas();
   verb.add_option("--voxels", o.voxels, "Voxels along the longest edge, ascending")
-      ->delimiter(',')
-      ->default_str("24,32,48,64,96");
+      .split_at_commas()
+      .set_default_text("24,32,48,64,96");
   verb.add_option("--effects", a.effects,
                   "auto, none, or a list of effects as `reconstruct` takes it; give the option again for "
                   "another [none and auto]")
-      ->allow_extra_args(false);
-  verb.add_option("--exposures", a.exposures_ms, "Milliseconds, ascending [1,4,16]")->delimiter(',');
+      .take_one_value();
+  verb.add_option("--exposures", a.exposures_ms, "Milliseconds, ascending [1,4,16]").split_at_commas();
   verb.add_option("--tolerances", a.tolerances_ms, "Milliseconds to either side, ascending [0.2,0.5,2,5]")
-      ->delimiter(',');
-  verb.add_option("--devices", a.devices, "cpu,cuda [those that this machine has]")->delimiter(',');
+      .split_at_commas();
+  verb.add_option("--devices", a.devices, "cpu,cuda [those that this machine has]").split_at_commas();
 }
 
 }  // namespace
 
-void add_tradeoff_rig(CLI::App& parent) {
+void add_tradeoff_rig(const Verb& parent) {
   auto arguments = std::make_shared<RigArguments>();
-  CLI::App* verb = parent.add_subcommand(
+  const Verb verb = parent.add_verb(
       "rig",
       "Error against minutes and euros for a flame: cameras, pictures, voxels, effects, exposure, tolerance "
       "and device together; the cheapest set-up that meets a target, and what the next step buys");
   RigArguments& a = *arguments;
   evaluate::RigTradeoffOptions& o = a.options;
-  verb->add_option("--out", a.out, "Folder for points.csv, rig.json and index.html")->required();
-  verb->add_option("--flame-speed", o.flame_speed, "Upward speed of the flame, m/s")->capture_default_str();
-  verb->add_option("--flame-size", a.flame_size, "Height of the flame, m")->capture_default_str();
-  add_lists(*verb, a);
-  verb->add_option("--target", o.target,
-                   "Held-out error to reach, grey levels [1.25 times the lowest found]");
-  verb->add_option("--camera-price", o.camera_price, "Euros")->capture_default_str();
-  verb->add_option("--noise", o.noise, "RMS noise of a pixel at 4 ms exposure, grey levels")
-      ->capture_default_str();
-  verb->add_option("--frames", o.frames, "Frames to reconstruct")->capture_default_str();
-  verb->add_option("--policies", a.policies,
-                   "How cameras are aligned, the quickest counts: fixed-reference,densest,timed,trimmed "
-                   "[timed]")
-      ->delimiter(',');
-  verb->add_option("--reset-seconds", a.reset_seconds,
-                   "Time of a reset by hand, for fixed-reference and densest")
-      ->capture_default_str();
-  verb->add_option("--rigs", o.rigs, "Alignments simulated for each number of cameras and tolerance")
-      ->capture_default_str();
-  verb->add_option("--seed", o.seed, "Seed of rigs, flame, times and noise")->capture_default_str();
-  verb->add_option("--threads", o.threads, "CPU threads; 0: one per core")
-      ->check(CLI::Range(0, 256))
-      ->capture_default_str();
-  verb->add_flag("--json", a.json, "Prints rig.json on stdout");
-  verb->callback([arguments] { tradeoff_rig(*arguments); });
+  verb.add_option("--out", a.out, "Folder for points.csv, rig.json and index.html").require();
+  verb.add_option("--flame-speed", o.flame_speed, "Upward speed of the flame, m/s").show_default();
+  verb.add_option("--flame-size", a.flame_size, "Height of the flame, m").show_default();
+  add_lists(verb, a);
+  verb.add_option("--target", o.target, "Held-out error to reach, grey levels [1.25 times the lowest found]");
+  verb.add_option("--camera-price", o.camera_price, "Euros").show_default();
+  verb.add_option("--noise", o.noise, "RMS noise of a pixel at 4 ms exposure, grey levels").show_default();
+  verb.add_option("--frames", o.frames, "Frames to reconstruct").show_default();
+  verb.add_option("--policies", a.policies,
+                  "How cameras are aligned, the quickest counts: fixed-reference,densest,timed,trimmed "
+                  "[timed]")
+      .split_at_commas();
+  verb.add_option("--reset-seconds", a.reset_seconds,
+                  "Time of a reset by hand, for fixed-reference and densest")
+      .show_default();
+  verb.add_option("--rigs", o.rigs, "Alignments simulated for each number of cameras and tolerance")
+      .show_default();
+  verb.add_option("--seed", o.seed, "Seed of rigs, flame, times and noise").show_default();
+  verb.add_threads(o.threads);
+  verb.add_flag("--json", a.json, "Prints rig.json on stdout");
+  verb.set_action([arguments] { tradeoff_rig(*arguments); });
 }
 
 }  // namespace emberlock::cli

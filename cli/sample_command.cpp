@@ -59,20 +59,20 @@ void sample(SampleArguments arguments) {
 
 }  // namespace
 
-void add_sample(CLI::App& app) {
+void add_sample(const Verb& app) {
   auto arguments = std::make_shared<SampleArguments>();
-  CLI::App* verb = app.add_subcommand(
+  const Verb verb = app.add_verb(
       "sample",
       "Makes small films to learn with, by simulation: a strobe and a flame, a comb, a calibration board, "
       "and the truth about them; prints what to do with them");
   SampleArguments& a = *arguments;
-  verb->add_option("folder", a.folder, "Folder for films/, comb/, board/ and truth.json")->required();
-  verb->add_option("--cameras", a.sample.cameras, "Number of cameras, 3 to 10")->capture_default_str();
-  verb->add_option("--image", a.image, "Size of the pictures")->capture_default_str();
-  verb->add_option("--frames", a.sample.flame_frames, "Frames that each camera films of the flame")
-      ->capture_default_str();
-  verb->add_option("--seed", a.sample.seed, "Seed of all random numbers")->capture_default_str();
-  verb->callback([arguments] { sample(*arguments); });
+  verb.add_option("folder", a.folder, "Folder for films/, comb/, board/ and truth.json").require();
+  verb.add_option("--cameras", a.sample.cameras, "Number of cameras, 3 to 10").show_default();
+  verb.add_option("--image", a.image, "Size of the pictures").show_default();
+  verb.add_option("--frames", a.sample.flame_frames, "Frames that each camera films of the flame")
+      .show_default();
+  verb.add_option("--seed", a.sample.seed, "Seed of all random numbers").show_default();
+  verb.set_action([arguments] { sample(*arguments); });
 }
 
 }  // namespace emberlock::cli

@@ -134,44 +134,40 @@ Status draw_scene(const SceneArguments& a) try {
 
 }  // namespace
 
-void add_scene(CLI::App& app) {
+void add_scene(const Verb& app) {
   auto arguments = std::make_shared<SceneArguments>();
   SceneArguments& a = *arguments;
-  CLI::App* verb = app.add_subcommand(
-      "scene", "Pictures or a video of flames among surfaces that they light and hide behind");
-  verb->add_option(
+  const Verb verb =
+      app.add_verb("scene", "Pictures or a video of flames among surfaces that they light and hide behind");
+  verb.add_option(
           "SCENE", a.scene,
           "A scene file (apply/README.md), or a .glb or .gltf whose nodes name results as emberlock_flame")
-      ->required();
-  verb->add_option("--out", a.out, "Folder for frame-0000.png and so on, or for the video")->required();
-  verb->add_option("--image", a.image, "Size of the pictures")->capture_default_str();
-  verb->add_option("--frames", a.frames, "In all [96 along a path or an orbit, 1 from one place]")
-      ->check(CLI::Range(1, 100000));
-  verb->add_option("--rate", a.format.rate, "Frames a second: of a video, and of time in the scene")
-      ->capture_default_str();
-  verb->add_option("--samples", a.samples,
-                   "Of each pixel: four times as many halve the noise of lit surfaces")
-      ->check(CLI::Range(1, 65536))
-      ->capture_default_str();
-  verb->add_option("--light-voxels", a.light_voxels,
-                   "Along a flame's longest side, by which it lights surfaces and its smoke shades them")
-      ->check(CLI::Range(4, 256))
-      ->capture_default_str();
-  verb->add_option("--seed", a.seed, "Of the random numbers")->capture_default_str();
-  verb->add_option(
+      .require();
+  verb.add_option("--out", a.out, "Folder for frame-0000.png and so on, or for the video").require();
+  verb.add_option("--image", a.image, "Size of the pictures").show_default();
+  verb.add_option("--frames", a.frames, "In all [96 along a path or an orbit, 1 from one place]")
+      .check_range(1, 100000);
+  verb.add_option("--rate", a.format.rate, "Frames a second: of a video, and of time in the scene")
+      .show_default();
+  verb.add_option("--samples", a.samples, "Of each pixel: four times as many halve the noise of lit surfaces")
+      .check_range(1, 65536)
+      .show_default();
+  verb.add_option("--light-voxels", a.light_voxels,
+                  "Along a flame's longest side, by which it lights surfaces and its smoke shades them")
+      .check_range(4, 256)
+      .show_default();
+  verb.add_option("--seed", a.seed, "Of the random numbers").show_default();
+  verb.add_option(
           "--format", a.format.format,
           "png; exr: 32 bits, R, G, B, the opacity A and the noise `error`; mp4: for any player; ffv1: "
           "lossless, in Matroska")
-      ->check(CLI::IsMember({"png", "exr", "mp4", "ffv1"}))
-      ->capture_default_str();
-  verb->add_flag("--transparent", a.transparent, "PNG before nothing instead of the background");
-  verb->add_option("--brightness", a.brightness, "Factor of all light")->capture_default_str();
-  verb->add_option("--device", a.device, "auto, cpu, cuda, or cuda:N: the GPU of this number")
-      ->capture_default_str();
-  verb->add_option("--threads", a.threads, "CPU threads; 0: one per core")
-      ->check(CLI::Range(0, 256))
-      ->capture_default_str();
-  verb->callback([arguments] { or_fail(draw_scene(*arguments)); });
+      .check_choices({"png", "exr", "mp4", "ffv1"})
+      .show_default();
+  verb.add_flag("--transparent", a.transparent, "PNG before nothing instead of the background");
+  verb.add_option("--brightness", a.brightness, "Factor of all light").show_default();
+  verb.add_device(a.device);
+  verb.add_threads(a.threads);
+  verb.set_action([arguments] { or_fail(draw_scene(*arguments)); });
 }
 
 }  // namespace emberlock::cli

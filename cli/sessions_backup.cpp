@@ -107,7 +107,7 @@ void backup(const BackupArguments& a) {
                               static_cast<double>(done->bytes) / 1e6));
   }
   if (folders.empty()) std::printf("No sessions.\n");
-  if (failed > 0) throw CLI::RuntimeError(1);
+  if (failed > 0) throw Exit(1);
 }
 
 double days_since(fs::file_time_type time) {
@@ -151,40 +151,39 @@ void prune(const BackupArguments& a) {
   }
   if (gone == 0 && failed == 0) std::printf("Nothing to remove.\n");
   if (gone > 0 && !a.yes) std::printf("Nothing was removed: --yes does it.\n");
-  if (failed > 0) throw CLI::RuntimeError(1);
+  if (failed > 0) throw Exit(1);
 }
 
 }  // namespace
 
-void add_sessions_backup(CLI::App& sessions) {
+void add_sessions_backup(const Verb& sessions) {
   auto a = std::make_shared<BackupArguments>();
-  CLI::App* copy = sessions.add_subcommand(
+  const Verb copy = sessions.add_verb(
       "backup",
       "Copies finished sessions to another folder, such as one on another disk: each appears there when it "
       "is whole, on the disk "
       "and read back. Those that are there already are left as they are; one that changed is copied anew.");
-  copy->add_option("FOLDER", a->folder, "A session, or the folder in which sessions lie")->required();
-  copy->add_option("--to", a->backups, "Folder of the copies; made if it isn't there")->required();
-  copy->add_flag("--compare", a->compare,
-                 "Read the copies that are there and compare each byte [sizes and times]");
-  copy->callback([a] { backup(*a); });
-  CLI::App* prune_verb =
-      sessions.add_subcommand("prune",
-                              "Removes the sessions that are the oldest on this machine and have a copy that "
-                              "is the same, byte for byte. Says what it "
-                              "would remove; --yes removes it.");
-  prune_verb->add_option("FOLDER", a->folder, "The folder in which sessions lie")->required();
-  prune_verb->add_option("--backups", a->backups, "Folder of the copies, as `backup --to` made them")
-      ->required();
-  auto* why = prune_verb->add_option_group("which", "Which go");
-  why->add_option("--older-than", a->older_than_days,
-                  "DAYS: those to which nothing has been written for so long")
-      ->check(CLI::NonNegativeNumber);
-  why->add_option("--free", a->free_gb, "GB: the oldest, until so much is free where they lie")
-      ->check(CLI::NonNegativeNumber);
-  why->require_option(1);
-  prune_verb->add_flag("--yes", a->yes, "Remove them");
-  prune_verb->callback([a] { prune(*a); });
+  copy.add_option("FOLDER", a->folder, "A session, or the folder in which sessions lie").require();
+  copy.add_option("--to", a->backups, "Folder of the copies; made if it isn't there").require();
+  copy.add_flag("--compare", a->compare,
+                "Read the copies that are there and compare each byte [sizes and times]");
+  copy.set_action([a] { backup(*a); });
+  const Verb prune_verb =
+      sessions.add_verb("prune",
+                        "Removes the sessions that are the oldest on this machine and have a copy that "
+                        "is the same, byte for byte. Says what it "
+                        "would remove; --yes removes it.");
+  prune_verb.add_option("FOLDER", a->folder, "The folder in which sessions lie").require();
+  prune_verb.add_option("--backups", a->backups, "Folder of the copies, as `backup --to` made them")
+      .require();
+  const Verb why = prune_verb.add_alternatives("which", "Which go");
+  why.add_option("--older-than", a->older_than_days,
+                 "DAYS: those to which nothing has been written for so long")
+      .check_not_negative();
+  why.add_option("--free", a->free_gb, "GB: the oldest, until so much is free where they lie")
+      .check_not_negative();
+  prune_verb.add_flag("--yes", a->yes, "Remove them");
+  prune_verb.set_action([a] { prune(*a); });
 }
 
 }  // namespace emberlock::cli

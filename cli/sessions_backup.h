@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <CLI/CLI.hpp>
+#include "cli/command_line.h"
 
 namespace emberlock::cli {
 
 /// Adds `backup` and `prune` to `sessions`.
-void add_sessions_backup(CLI::App& sessions);
+void add_sessions_backup(const Verb& sessions);
 
 }  // namespace emberlock::cli

@@ -129,7 +129,7 @@ void verify(const SessionsArguments& a) {
                   check.certified_by.empty() ? "unsigned" : ("signed by " + check.certified_by).c_str());
     std::printf("%s\n", check.whole() ? "All there." : (check.to_do + ".").c_str());
   }
-  if (!check.whole()) throw CLI::RuntimeError(1);
+  if (!check.whole()) throw Exit(1);
   if (a.public_key.empty()) return;
   const std::string trusted = or_fail(read_public_key(a.public_key));
   if (check.certified_files == 0)
@@ -195,7 +195,7 @@ Exported export_of(const SessionsArguments& a) {
         job_by_daemon(a.daemon, png ? SessionJob::export_png : SessionJob::export_video, a.folder);
     return {outcome.export_().folder(), session::from_proto(outcome.export_())};
   }
-  if (a.out.empty()) throw CLI::RequiredError("--out");
+  if (a.out.empty()) throw UsageError("--out is required");
   const Interrupt interrupt;
   const session::ExportFormat format = png ? session::ExportFormat::png : session::ExportFormat::video;
   return {a.out, or_fail(session::export_session(a.folder, a.out, format, until_interrupted("export")))};
@@ -222,61 +222,60 @@ void export_frames(const SessionsArguments& a) {
 }
 
 /// Adds a verb of `sessions` that takes one session's folder.
-CLI::App* add_verb(CLI::App& sessions, const char* name, const char* words,
-                   const std::shared_ptr<SessionsArguments>& a, void (*run)(const SessionsArguments&)) {
-  CLI::App* verb = sessions.add_subcommand(name, words);
-  verb->add_option(
-          "SESSION", a->folder,
-          "The session's folder, or the name of one of the daemon's; of a folder here if it has none")
-      ->required();
-  add_daemon_options(*verb, a->daemon);
-  verb->add_flag("--json", a->json, "One JSON object");
-  verb->callback([a, run] { run(meant(*a)); });
+Verb add_verb(const Verb& sessions, const char* name, const char* words,
+              const std::shared_ptr<SessionsArguments>& a, void (*run)(const SessionsArguments&)) {
+  const Verb verb = sessions.add_verb(name, words);
+  verb.add_option("SESSION", a->folder,
+                  "The session's folder, or the name of one of the daemon's; of a folder here if it has none")
+      .require();
+  add_daemon_options(verb, a->daemon);
+  verb.add_flag("--json", a->json, "One JSON object");
+  verb.set_action([a, run] { run(meant(*a)); });
   return verb;
 }
 
 }  // namespace
 
-void add_sessions(CLI::App& app) {
+void add_sessions(const Verb& app) {
   auto a = std::make_shared<SessionsArguments>();
-  CLI::App* sessions = app.add_subcommand("sessions",
-                                          "Lists, verifies, repairs, exports, backs up and joins recordings: "
-                                          "the daemon's by name, others by path.");
-  sessions->require_subcommand(1);
-  CLI::App* all = sessions->add_subcommand("list", "Lists the sessions in a folder, the newest first.");
-  all->add_option("FOLDER", a->folder, "Folder of sessions [the daemon's]");
-  add_daemon_options(*all, a->daemon);
-  all->add_flag("--json", a->json, "One JSON object");
-  all->callback([a] { list(*a); });
-  CLI::App* verified = add_verb(
-      *sessions, "verify",
+  const Verb sessions = app.add_verb("sessions",
+                                     "Lists, verifies, repairs, exports, backs up and joins recordings: "
+                                     "the daemon's by name, others by path.");
+  sessions.require_verb();
+  const Verb all = sessions.add_verb("list", "Lists the sessions in a folder, the newest first.");
+  all.add_option("FOLDER", a->folder, "Folder of sessions [the daemon's]");
+  add_daemon_options(all, a->daemon);
+  all.add_flag("--json", a->json, "One JSON object");
+  all.set_action([a] { list(*a); });
+  const Verb verified = add_verb(
+      sessions, "verify",
       "Reads every frame back and compares it with its checksum, and every file with certificate.json, where "
       "there is one. Exit code 1: frames or files are missing or differ.",
       a, verify);
-  verified->add_option("--public-key", a->public_key,
-                       "The key (PEM) that must have signed the session's certificate");
-  add_verb(*sessions, "repair",
+  verified.add_option("--public-key", a->public_key,
+                      "The key (PEM) that must have signed the session's certificate");
+  add_verb(sessions, "repair",
            "Repairs a session whose recorder was killed. Of a damaged session it keeps what is good and says "
            "what is lost.",
            a, repair);
-  CLI::App* certify = sessions->add_subcommand(
+  const Verb certify = sessions.add_verb(
       "certify",
       "Writes certificate.json, the hash of each of a session's files, by which `sessions verify` finds any "
       "change.");
-  certify->add_option("SESSION", a->folder, "The session's folder")->required();
+  certify.add_option("SESSION", a->folder, "The session's folder").require();
   add_key_option(certify, a->key);
-  certify->callback([a, &app] {
+  certify.set_action([a, app] {
     a->program = app.version();
     certify_session(*a);
   });
-  CLI::App* out =
-      add_verb(*sessions, "export", "Writes frames as files that other programs read.", a, export_frames);
-  out->add_option("--out", a->out, "Folder to make; for the daemon's sessions the daemon chooses it");
-  out->add_option("--format", a->format, "png: images without loss; video: H.264, to look at")
-      ->check(CLI::IsMember({"png", "video"}))
-      ->capture_default_str();
-  add_sessions_backup(*sessions);
-  add_sessions_join(*sessions);
+  const Verb out =
+      add_verb(sessions, "export", "Writes frames as files that other programs read.", a, export_frames);
+  out.add_option("--out", a->out, "Folder to make; for the daemon's sessions the daemon chooses it");
+  out.add_option("--format", a->format, "png: images without loss; video: H.264, to look at")
+      .check_choices({"png", "video"})
+      .show_default();
+  add_sessions_backup(sessions);
+  add_sessions_join(sessions);
 }
 
 }  // namespace emberlock::cli

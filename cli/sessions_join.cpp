@@ -89,18 +89,18 @@ void join_parts(const JoinArguments& a) {
 
 }  // namespace
 
-void add_sessions_join(CLI::App& sessions) {
+void add_sessions_join(const Verb& sessions) {
   auto a = std::make_shared<JoinArguments>();
-  CLI::App* verb = sessions.add_subcommand(
+  const Verb verb = sessions.add_verb(
       "join",
       "Makes one session of the parts that several hosts recorded of it. The parts stay; the session appears "
       "when it is whole, on the disk and read back.");
-  verb->add_option("PART", a->parts, "The folders of the parts, the leading host's among them; in any order")
-      ->required();
-  verb->add_option("--out", a->out, "Folder to make")->required();
-  verb->add_flag("--without-missing", a->without_missing,
-                 "Go on without parts that aren't given; the session's manifest goes on naming them");
-  verb->callback([a] { join_parts(*a); });
+  verb.add_option("PART", a->parts, "The folders of the parts, the leading host's among them; in any order")
+      .require();
+  verb.add_option("--out", a->out, "Folder to make").require();
+  verb.add_flag("--without-missing", a->without_missing,
+                "Go on without parts that aren't given; the session's manifest goes on naming them");
+  verb.set_action([a] { join_parts(*a); });
 }
 
 }  // namespace emberlock::cli

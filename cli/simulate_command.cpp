@@ -127,23 +127,23 @@ void simulate(SimulateArguments arguments) {
 }
 
 /// What their pictures are like.
-void add_camera_options(CLI::App& verb, SimulateArguments& a) {
+void add_camera_options(const Verb& verb, SimulateArguments& a) {
   verb.add_option("--format", a.format, "Of the pictures; bayer: a mosaic of colours")
-      ->check(CLI::IsMember(pixel_formats()))
-      ->capture_default_str();
+      .check_choices(names_of(pixel_formats()))
+      .show_default();
   verb.add_option(
           "--response", a.response,
           "JSON file of the cameras' spectral response, whose levels hold for 1 ms; the session keeps it")
-      ->type_name("FILE");
+      .set_type("FILE");
   verb.add_option("--exposure", a.exposure_ms,
                   "Milliseconds, of a response with its scale [what the brightest pixel needs for 230 of 255 "
                   "levels]");
   verb.add_option("--offsets", a.offsets_ms, "Milliseconds by which cameras' shutters are late at most")
-      ->capture_default_str();
+      .show_default();
   verb.add_flag(
           "--stagger", a.stagger,
           "Cameras at instants spread evenly over the frame period, as `emberlock align --stagger` has them")
-      ->excludes("--offsets");
+      .exclude("--offsets");
   verb.add_option("--sun", a.sun, "x,y,z: of smoke, where the sun stands (default: 1,-1,1)");
   verb.add_option(
       "--albedo", a.albedo,
@@ -152,34 +152,31 @@ void add_camera_options(CLI::App& verb, SimulateArguments& a) {
 
 }  // namespace
 
-void add_simulate(CLI::App& app) {
-  CLI::App* parent = app.add_subcommand("simulate", "Simulates what cameras can film");
-  parent->require_subcommand(1);
+void add_simulate(const Verb& app) {
+  const Verb parent = app.add_verb("simulate", "Simulates what cameras can film");
+  parent.require_verb();
   auto arguments = std::make_shared<SimulateArguments>();
-  CLI::App* verb = parent->add_subcommand(
+  const Verb verb = parent.add_verb(
       "flame",
       "Computes burning gas and films it with simulated cameras: a session, and the truth beside it");
   SimulateArguments& a = *arguments;
-  verb->add_option("--out", a.out, "Folder for session/ and truth/")->required();
-  verb->add_option("--preset", a.preset,
-                   "candle, pool-fire, torch, two-plumes, or smoke, which the sun lights")
-      ->capture_default_str();
-  verb->add_option("--frames", a.simulate.frames, "Frames that each camera films")->capture_default_str();
-  verb->add_option("--rig", a.cameras, "virtual:N, so many cameras on an arc around the flame")
-      ->capture_default_str();
-  verb->add_option("--image", a.image, "Size of the pictures")->capture_default_str();
-  verb->add_option("--cells", a.simulate.cells,
-                   "Cells of the gas across, a multiple of 8; twice as many upwards")
-      ->capture_default_str();
-  verb->add_option("--rate", a.rate, "Frames a second")->capture_default_str();
-  verb->add_option("--noise", a.simulate.read_noise, "Read noise, grey levels; 0: no noise at all")
-      ->capture_default_str();
-  add_camera_options(*verb, a);
-  verb->add_option("--threads", a.simulate.compute.threads, "CPU threads; 0: one per core")
-      ->check(CLI::Range(0, 256))
-      ->capture_default_str();
-  verb->add_option("--seed", a.simulate.seed, "Seed of all random numbers")->capture_default_str();
-  verb->callback([arguments] { simulate(*arguments); });
+  verb.add_option("--out", a.out, "Folder for session/ and truth/").require();
+  verb.add_option("--preset", a.preset,
+                  "candle, pool-fire, torch, two-plumes, or smoke, which the sun lights")
+      .show_default();
+  verb.add_option("--frames", a.simulate.frames, "Frames that each camera films").show_default();
+  verb.add_option("--rig", a.cameras, "virtual:N, so many cameras on an arc around the flame").show_default();
+  verb.add_option("--image", a.image, "Size of the pictures").show_default();
+  verb.add_option("--cells", a.simulate.cells,
+                  "Cells of the gas across, a multiple of 8; twice as many upwards")
+      .show_default();
+  verb.add_option("--rate", a.rate, "Frames a second").show_default();
+  verb.add_option("--noise", a.simulate.read_noise, "Read noise, grey levels; 0: no noise at all")
+      .show_default();
+  add_camera_options(verb, a);
+  verb.add_threads(a.simulate.compute.threads);
+  verb.add_option("--seed", a.simulate.seed, "Seed of all random numbers").show_default();
+  verb.set_action([arguments] { simulate(*arguments); });
 }
 
 }  // namespace emberlock::cli

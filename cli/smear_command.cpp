@@ -79,20 +79,20 @@ void run_smear(const SmearArguments& arguments) {
     std::fprintf(stderr, "emberlock: %s\n", status.error().message().c_str());
     failed = true;
   }
-  if (failed) throw CLI::RuntimeError("smear: not all files could be read", 2);
+  if (failed) throw Exit(2, "smear: not all files could be read");
 }
 
 }  // namespace
 
-void add_smear(CLI::App& app) {
-  auto* verb =
-      app.add_subcommand("smear", "Finds the lamp and its smear dots in images and videos of a strobe.");
+void add_smear(const Verb& app) {
+  const Verb verb =
+      app.add_verb("smear", "Finds the lamp and its smear dots in images and videos of a strobe.");
   auto arguments = std::make_shared<SmearArguments>();
-  verb->add_option("files", arguments->files, "images (PGM, PNG, TIFF, JPEG, FITS) or videos")->required();
-  verb->add_flag("--json", arguments->json,
-                 "one JSON object per frame, each on a line; rows and columns count from 0 at the centre of "
-                 "the top left pixel");
-  verb->callback([arguments] { run_smear(*arguments); });
+  verb.add_option("files", arguments->files, "images (PGM, PNG, TIFF, JPEG, FITS) or videos").require();
+  verb.add_flag("--json", arguments->json,
+                "one JSON object per frame, each on a line; rows and columns count from 0 at the centre of "
+                "the top left pixel");
+  verb.set_action([arguments] { run_smear(*arguments); });
 }
 
 }  // namespace emberlock::cli

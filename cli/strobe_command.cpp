@@ -22,7 +22,7 @@ namespace {
 
 struct StrobeArguments {
   DaemonAddress daemon;
-  std::optional<v1::StrobeState::Output> output;
+  std::optional<int> output;  ///< StrobeState::Output
   std::optional<double> rate_hz, phase_ms, width_us;
   std::optional<std::string> code;
   bool json = false;
@@ -39,7 +39,7 @@ constexpr std::size_t kLongestPrinted = 64;  // flashes of a code
 
 /// Applies the arguments; returns whether there are any changes.
 bool change(v1::StrobeState& state, const StrobeArguments& arguments) {
-  if (arguments.output) state.set_output(*arguments.output);
+  if (arguments.output) state.set_output(static_cast<v1::StrobeState::Output>(*arguments.output));
   if (arguments.rate_hz) state.set_rate_hz(*arguments.rate_hz);
   if (arguments.phase_ms) state.set_phase_s(*arguments.phase_ms * 1e-3);
   if (arguments.width_us) state.set_width_s(*arguments.width_us * 1e-6);
@@ -100,61 +100,62 @@ void strobe(StrobeArguments arguments) {
 }
 
 /// The code by which verify and import know frames.
-void add_frame_code_options(CLI::App& verb, StrobeArguments& a) {
-  auto* frame_code = verb.add_flag(
+void add_frame_code_options(const Verb& verb, StrobeArguments& a) {
+  const Option frame_code = verb.add_flag(
       "--frame-code", a.frame_code,
       "Prints the code of skipped flashes by which verify and import tell which frames belong together");
-  auto* play =
+  const Option play =
       verb.add_flag("--play", a.play, "Lets the daemon's strobe flash with it, at --rate [as it is set]")
-          ->needs(frame_code);
+          .need(frame_code);
   verb.add_option("--csv", a.csv, "Writes it for a signal generator, a line for each flash, at --rate [24.2]")
-      ->needs(frame_code)
-      ->excludes(play);
-  auto* wav = verb.add_option("--wav", a.wav, "Writes one cycle as a sound file, full level during a flash")
-                  ->needs(frame_code)
-                  ->excludes(play);
+      .need(frame_code)
+      .exclude(play);
+  const Option wav =
+      verb.add_option("--wav", a.wav, "Writes one cycle as a sound file, full level during a flash")
+          .need(frame_code)
+          .exclude(play);
   verb.add_option("--wav-rate", a.wav_rate_hz, "Samples per second of the sound file")
-      ->check(CLI::Range(1.0, 1e7))
-      ->capture_default_str()
-      ->needs(wav);
+      .check_range(1.0, 1e7)
+      .show_default()
+      .need(wav);
   verb.add_option("--code-words", a.words.words, "Words of the code, as for verify")
-      ->check(CLI::Range(1, 31))
-      ->capture_default_str()
-      ->needs(frame_code);
+      .check_range(1, 31)
+      .show_default()
+      .need(frame_code);
   verb.add_option("--code-spacing", a.words.spacing, "Flashes from one word to the next, as for verify")
-      ->check(CLI::Range(32, 100000))
-      ->capture_default_str()
-      ->needs(frame_code);
-  frame_code->excludes(verb.get_option("--code"))->excludes(verb.get_option("--output"));
+      .check_range(32, 100000)
+      .show_default()
+      .need(frame_code);
+  frame_code.exclude(verb.find_option("--code")).exclude(verb.find_option("--output"));
 }
 
 }  // namespace
 
-void add_strobe(CLI::App& app) {
+void add_strobe(const Verb& app) {
   auto arguments = std::make_shared<StrobeArguments>();
-  CLI::App* verb = app.add_subcommand(
+  const Verb verb = app.add_verb(
       "strobe",
       "Prints the strobe's settings; with options sets them, and prints what was read back. With "
       "--frame-code prints the strobe's code, without a daemon");
   StrobeArguments& a = *arguments;
-  add_daemon_options(*verb, a.daemon);
-  const std::map<std::string, v1::StrobeState::Output> outputs = {{"off", v1::StrobeState::OFF},
-                                                                  {"flashing", v1::StrobeState::FLASHING},
-                                                                  {"steady", v1::StrobeState::STEADY}};
-  verb->add_option("--output", a.output, "off, flashing or steady")
-      ->transform(CLI::CheckedTransformer(outputs));
-  verb->add_option("--rate", a.rate_hz, "Flashes per second, Hz")->check(CLI::PositiveNumber);
-  verb->add_option("--phase", a.phase_ms, "Phase of the flashes, ms");
-  verb->add_option("--width", a.width_us, "Duration of a flash, us")->check(CLI::PositiveNumber);
-  verb->add_option("--code", a.code,
-                   "Cyclic pattern of flashes, 0 skips one: 1101; empty: no flash is skipped")
-      ->check([](const std::string& text) {
+  add_daemon_options(verb, a.daemon);
+  verb.add_option("--output", a.output, "off, flashing or steady")
+      .set_type("ENUM")
+      .check_numbered_choices({{"off", v1::StrobeState::OFF},
+                               {"flashing", v1::StrobeState::FLASHING},
+                               {"steady", v1::StrobeState::STEADY}});
+  verb.add_option("--rate", a.rate_hz, "Flashes per second, Hz").check_positive();
+  verb.add_option("--phase", a.phase_ms, "Phase of the flashes, ms");
+  verb.add_option("--width", a.width_us, "Duration of a flash, us").check_positive();
+  verb.add_option("--code", a.code,
+                  "Cyclic pattern of flashes, 0 skips one: 1101; empty: no flash is skipped")
+      .check([](const std::string& text) {
         return text.find_first_not_of("01") == std::string::npos ? std::string()
                                                                  : "only 0 and 1 can stand in a code";
       });
-  add_frame_code_options(*verb, a);
-  verb->add_flag("--json", a.json, "StrobeState of emberlock/v1/session.proto, as JSON on one line");
-  verb->callback([arguments] { strobe(*arguments); });
+  add_frame_code_options(verb, a);
+  verb.add_flag("--json", a.json, "StrobeState of emberlock/v1/session.proto, as JSON on one line");
+  verb.set_action([arguments] { strobe(*arguments); });
 }
 
 }  // namespace emberlock::cli

@@ -308,47 +308,45 @@ void stylize_command(const StylizeArguments& a) {
 
 }  // namespace
 
-void add_stylize(CLI::App& app) {
+void add_stylize(const Verb& app) {
   auto arguments = std::make_shared<StylizeArguments>();
   StylizeArguments& a = *arguments;
-  CLI::App* verb = app.add_subcommand(
-      "stylize", "Goes on with a reconstruction while its pictures and its volume are edited");
-  verb->add_option("SCENE", a.reconstruct.input, "transforms.json, or a recorded session's folder")
-      ->required();
-  verb->add_option("--out", a.out,
-                   "Folder for what reconstruct writes, the steps as edits.json, and edited pictures")
-      ->required();
-  verb->add_option("--edits", a.edits,
-                   "The steps, as apply/edit_file.h describes them, or an edits.json to be replayed");
-  verb->add_flag(
+  const Verb verb =
+      app.add_verb("stylize", "Goes on with a reconstruction while its pictures and its volume are edited");
+  verb.add_option("SCENE", a.reconstruct.input, "transforms.json, or a recorded session's folder").require();
+  verb.add_option("--out", a.out,
+                  "Folder for what reconstruct writes, the steps as edits.json, and edited pictures")
+      .require();
+  verb.add_option("--edits", a.edits,
+                  "The steps, as apply/edit_file.h describes them, or an edits.json to be replayed");
+  verb.add_flag(
       "--live", a.live,
       "Read further steps from stdin, a JSON object a line, that take effect before the next pass; "
       "a line of JSON on stdout tells of each pass, and where its preview is. Ends after the end of stdin");
-  verb->add_option("--passes", a.passes,
-                   "After the last step [the file's number in all, or 60]; live: after each")
-      ->check(CLI::Range(0, 1000000));
-  verb->add_option("--colours", a.colours,
-                   "flame: green tells a temperature, and that the colour; captured: as reconstructed [the "
-                   "file's, or flame]")
-      ->check(CLI::IsMember({"flame", "captured"}));
-  verb->add_flag("--previews", a.previews, "A picture after every pass, OUT/previews/0001.png and so on");
-  verb->add_option("--progress-fd", a.reconstruct.progress_fd,
-                   "For programs: take steps from stdin and tell of everything on this descriptor "
-                   "(emberlock/v1/child.proto); end when the parent ends")
-      ->check(CLI::NonNegativeNumber)
-      ->excludes("--edits")
-      ->excludes("--live")
-      ->excludes("--previews");
-  verb->add_option("--view", a.view, "The view that previews show [the first that is edited]");
-  verb->add_option("--rig", a.reconstruct.rig, "Sessions only: rig.json of `calibrate cameras`");
-  verb->add_option("--box", a.reconstruct.box, "cx,cy,cz,sx,sy,sz: the volume's centre and size in metres");
-  verb->add_option("--voxels", a.reconstruct.voxels,
-                   "Along the longest edge [the edits', or as reconstruct]");
+  verb.add_option("--passes", a.passes,
+                  "After the last step [the file's number in all, or 60]; live: after each")
+      .check_range(0, 1000000);
+  verb.add_option("--colours", a.colours,
+                  "flame: green tells a temperature, and that the colour; captured: as reconstructed [the "
+                  "file's, or flame]")
+      .check_choices({"flame", "captured"});
+  verb.add_flag("--previews", a.previews, "A picture after every pass, OUT/previews/0001.png and so on");
+  verb.add_option("--progress-fd", a.reconstruct.progress_fd,
+                  "For programs: take steps from stdin and tell of everything on this descriptor "
+                  "(emberlock/v1/child.proto); end when the parent ends")
+      .check_not_negative()
+      .exclude("--edits")
+      .exclude("--live")
+      .exclude("--previews");
+  verb.add_option("--view", a.view, "The view that previews show [the first that is edited]");
+  verb.add_option("--rig", a.reconstruct.rig, "Sessions only: rig.json of `calibrate cameras`");
+  verb.add_option("--box", a.reconstruct.box, "cx,cy,cz,sx,sy,sz: the volume's centre and size in metres");
+  verb.add_option("--voxels", a.reconstruct.voxels, "Along the longest edge [the edits', or as reconstruct]");
   add_solve_options(verb, a.reconstruct);
   add_frame_options(verb, a.reconstruct);
   add_picture_options(verb, a.reconstruct);
   add_certificate_options(verb, a.reconstruct.certificate);
-  verb->callback([arguments, &app] {
+  verb.set_action([arguments, app] {
     arguments->reconstruct.certificate.program = app.version();
     if (arguments->reconstruct.last_frame)
       fail({ErrorKind::bad_input, "one frame is edited at a time", "--frames", "Give --frame"});

@@ -68,52 +68,48 @@ void tradeoff_sync(const SyncArguments& arguments) {
 
 }  // namespace
 
-void add_tradeoff_sync(CLI::App& parent) {
+void add_tradeoff_sync(const Verb& parent) {
   auto arguments = std::make_shared<SyncArguments>();
-  CLI::App* verb = parent.add_subcommand("sync",
-                                         "Resets and minutes that each tolerance of the cameras costs, and "
-                                         "the error that it adds for a rising flame");
+  const Verb verb = parent.add_verb("sync",
+                                    "Resets and minutes that each tolerance of the cameras costs, and "
+                                    "the error that it adds for a rising flame");
   SyncArguments& a = *arguments;
   evaluate::SyncTradeoffOptions& o = a.options;
-  verb->add_option("--out", a.out, "Folder for points.csv, diagram.svg and index.html")->required();
-  verb->add_option("--cameras", o.cameras, "Cameras of the rig")->capture_default_str();
-  verb->add_option("--tolerances", a.tolerances, "Rows to either side: i,j,... [1,2,5,10,20,50,100,200]")
-      ->delimiter(',');
-  verb->add_option("--policies", a.policies, "[fixed-reference,densest,timed,trimmed]")->delimiter(',');
-  verb->add_option("--frame-rate", a.frame_rate, "Frames per second")->capture_default_str();
-  verb->add_option("--row-time-us", a.row_time_us, "Time to shift one row")->capture_default_str();
-  verb->add_option("--latency-jitter", a.latency_jitter_ms, "RMS jitter of a commanded reset's latency, ms")
-      ->capture_default_str();
-  verb->add_option("--latency-spread", a.latency_spread_ms,
-                   "RMS spread of the cameras' mean latencies, ms; they are unknown at first")
-      ->capture_default_str();
-  verb->add_option("--crystal-spread", a.crystal_spread_ppm, "RMS spread of the cameras' frame rates, ppm")
-      ->capture_default_str();
-  verb->add_option("--reset-seconds", a.reset_seconds,
-                   "Time of a reset by hand, for fixed-reference and densest")
-      ->capture_default_str();
-  verb->add_option("--round-seconds", a.round_seconds, "Time of filming between resets")
-      ->capture_default_str();
-  verb->add_option("--trim-range", a.trim_range_ppm, "How far the policy trimmed can change frame rates, ppm")
-      ->capture_default_str();
-  verb->add_option("--trim-step", a.trim_step_ppm, "Step of these trims, ppm")->capture_default_str();
-  verb->add_option("--rigs", o.rigs, "Rigs that are simulated for each point")->capture_default_str();
-  verb->add_option("--seed", o.seed, "Seed of rigs, flame and draws")->capture_default_str();
-  verb->add_option("--flame-speed", o.flame_speed, "Upward speed of the flame, m/s; 0: no flame")
-      ->capture_default_str();
-  verb->add_option("--voxels", o.voxels, "Voxels along an edge of the flame's reconstruction")
-      ->capture_default_str();
-  verb->add_option("--draws", o.draws, "Random draws of the cameras' times within each tolerance")
-      ->capture_default_str();
-  verb->add_option(
+  verb.add_option("--out", a.out, "Folder for points.csv, diagram.svg and index.html").require();
+  verb.add_option("--cameras", o.cameras, "Cameras of the rig").show_default();
+  verb.add_option("--tolerances", a.tolerances, "Rows to either side: i,j,... [1,2,5,10,20,50,100,200]")
+      .split_at_commas();
+  verb.add_option("--policies", a.policies, "[fixed-reference,densest,timed,trimmed]").split_at_commas();
+  verb.add_option("--frame-rate", a.frame_rate, "Frames per second").show_default();
+  verb.add_option("--row-time-us", a.row_time_us, "Time to shift one row").show_default();
+  verb.add_option("--latency-jitter", a.latency_jitter_ms, "RMS jitter of a commanded reset's latency, ms")
+      .show_default();
+  verb.add_option("--latency-spread", a.latency_spread_ms,
+                  "RMS spread of the cameras' mean latencies, ms; they are unknown at first")
+      .show_default();
+  verb.add_option("--crystal-spread", a.crystal_spread_ppm, "RMS spread of the cameras' frame rates, ppm")
+      .show_default();
+  verb.add_option("--reset-seconds", a.reset_seconds,
+                  "Time of a reset by hand, for fixed-reference and densest")
+      .show_default();
+  verb.add_option("--round-seconds", a.round_seconds, "Time of filming between resets").show_default();
+  verb.add_option("--trim-range", a.trim_range_ppm, "How far the policy trimmed can change frame rates, ppm")
+      .show_default();
+  verb.add_option("--trim-step", a.trim_step_ppm, "Step of these trims, ppm").show_default();
+  verb.add_option("--rigs", o.rigs, "Rigs that are simulated for each point").show_default();
+  verb.add_option("--seed", o.seed, "Seed of rigs, flame and draws").show_default();
+  verb.add_option("--flame-speed", o.flame_speed, "Upward speed of the flame, m/s; 0: no flame")
+      .show_default();
+  verb.add_option("--voxels", o.voxels, "Voxels along an edge of the flame's reconstruction").show_default();
+  verb.add_option("--draws", o.draws, "Random draws of the cameras' times within each tolerance")
+      .show_default();
+  verb.add_option(
           "--added-error", o.added_error,
           "Percent that the recommended tolerance may add to the error of perfectly synchronized cameras")
-      ->capture_default_str();
-  verb->add_option("--threads", o.threads, "CPU threads; 0: one per core")
-      ->check(CLI::Range(0, 256))
-      ->capture_default_str();
-  verb->add_flag("--json", a.json, "All points as one JSON object on stdout");
-  verb->callback([arguments] { tradeoff_sync(*arguments); });
+      .show_default();
+  verb.add_threads(o.threads);
+  verb.add_flag("--json", a.json, "All points as one JSON object on stdout");
+  verb.set_action([arguments] { tradeoff_sync(*arguments); });
 }
 
 }  // namespace emberlock::cli

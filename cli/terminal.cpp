@@ -14,17 +14,15 @@
 
 namespace emberlock::cli {
 
-int run(CLI::App& app, int argc, char** argv) {
+int run(const CommandLine& line, int argc, char** argv) {
   try {
-    app.parse(argc, argv);
-  } catch (const CLI::Success& e) {
-    return app.exit(e);
-  } catch (const CLI::RuntimeError& e) {
-    return e.get_exit_code();
-  } catch (const CLI::ParseError& e) {
-    const std::string wrong = usage_error(app, e);
+    line.parse({argv + 1, argv + argc});
+  } catch (const Exit& e) {
+    return e.code;
+  } catch (const UsageError& e) {
+    const std::string wrong = usage_error(line.program(), e);
     if (wrong.empty()) {
-      std::printf("%s", help_of_missing_verb(app).c_str());
+      std::printf("%s", help_of_missing_verb(line.program()).c_str());
     } else {
       std::fprintf(stderr, "emberlock: %s\n", wrong.c_str());
     }
@@ -35,7 +33,7 @@ int run(CLI::App& app, int argc, char** argv) {
 
 void fail(const Error& error) {
   std::fprintf(stderr, "emberlock: %s\n", error.message().c_str());
-  throw CLI::RuntimeError(error.message(), error.kind == ErrorKind::bad_input ? 2 : 1);
+  throw Exit(error.kind == ErrorKind::bad_input ? 2 : 1, error.message());
 }
 
 Progress progress_bar(const std::string& title) {

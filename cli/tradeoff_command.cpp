@@ -152,56 +152,52 @@ void tradeoff_recon(const SweepArguments& arguments) {
   print_summary(tradeoff, arguments.out);
 }
 
-void add_recon(CLI::App& parent) {
+void add_recon(const Verb& parent) {
   auto arguments = std::make_shared<SweepArguments>();
-  CLI::App* verb = parent.add_subcommand(
+  const Verb verb = parent.add_verb(
       "recon", "Held-out error against seconds for many settings of `reconstruct`, with the Pareto front");
   SweepArguments& a = *arguments;
-  verb->add_option("input", a.input, "transforms.json, or a recorded session's folder");
-  verb->add_option("--out", a.out, "Folder for points.csv, diagram.svg and index.html");
-  verb->add_option("--hold-out", a.held_out, "Views, counted from 0, that every point is scored on: i,j,...")
-      ->delimiter(',');
-  verb->add_option("--voxels", a.voxels,
-                   "Voxels along the longest edge. The first value of each list is the base [eighths of what "
-                   "the pictures can show: 4,1,2,3,6,8]")
-      ->delimiter(',');
-  verb->add_option("--views", a.views, "Numbers of input views, 0 for all [0, half, three quarters]")
-      ->delimiter(',');
-  verb->add_option("--iterations", a.iterations,
-                   "Iterations after which each run is scored; it ends at the largest. The paper's solver: "
-                   "eight times as many [1,2,3,4,6,8,12]")
-      ->delimiter(',');
-  verb->add_option("--step", a.steps, "Longest steps along a ray, in voxel edges [1,0.5,2]")->delimiter(',');
-  verb->add_option("--precision", a.precisions, "[float32,float64]")->delimiter(',');
-  verb->add_option("--effects", a.effects,
-                   "auto, none, or a list of effects as `reconstruct` takes it; give the option again for "
-                   "another list [auto,none]")
-      ->allow_extra_args(false);
-  verb->add_option("--solver", a.solvers, "[default,paper]")->delimiter(',');
-  verb->add_option("--budget", a.budget, "Stop the sweep after so many seconds, and report the points so far")
-      ->check(CLI::PositiveNumber);
-  verb->add_option("--box", a.box, "As in `reconstruct`");
-  verb->add_option("--frame", a.frame, "As in `reconstruct`")->check(CLI::NonNegativeNumber);
-  verb->add_option("--device", a.device, "auto, cpu, cuda, or cuda:N: the GPU of this number")
-      ->capture_default_str();
-  verb->add_option("--threads", a.threads, "CPU threads; 0: one per core")
-      ->check(CLI::Range(0, 256))
-      ->capture_default_str();
-  verb->add_option(
-      "--ship", a.ship,
-      "Instead: measure the front that --budget and --target-rmse of `reconstruct` choose by, on "
-      "simulated flames, and write it to this file (recon/pipeline/reference_front.inc)");
-  verb->callback([arguments] { tradeoff_recon(*arguments); });
+  verb.add_option("input", a.input, "transforms.json, or a recorded session's folder");
+  verb.add_option("--out", a.out, "Folder for points.csv, diagram.svg and index.html");
+  verb.add_option("--hold-out", a.held_out, "Views, counted from 0, that every point is scored on: i,j,...")
+      .split_at_commas();
+  verb.add_option("--voxels", a.voxels,
+                  "Voxels along the longest edge. The first value of each list is the base [eighths of what "
+                  "the pictures can show: 4,1,2,3,6,8]")
+      .split_at_commas();
+  verb.add_option("--views", a.views, "Numbers of input views, 0 for all [0, half, three quarters]")
+      .split_at_commas();
+  verb.add_option("--iterations", a.iterations,
+                  "Iterations after which each run is scored; it ends at the largest. The paper's solver: "
+                  "eight times as many [1,2,3,4,6,8,12]")
+      .split_at_commas();
+  verb.add_option("--step", a.steps, "Longest steps along a ray, in voxel edges [1,0.5,2]").split_at_commas();
+  verb.add_option("--precision", a.precisions, "[float32,float64]").split_at_commas();
+  verb.add_option("--effects", a.effects,
+                  "auto, none, or a list of effects as `reconstruct` takes it; give the option again for "
+                  "another list [auto,none]")
+      .take_one_value();
+  verb.add_option("--solver", a.solvers, "[default,paper]").split_at_commas();
+  verb.add_option("--budget", a.budget, "Stop the sweep after so many seconds, and report the points so far")
+      .check_positive();
+  verb.add_option("--box", a.box, "As in `reconstruct`");
+  verb.add_option("--frame", a.frame, "As in `reconstruct`").check_not_negative();
+  verb.add_device(a.device);
+  verb.add_threads(a.threads);
+  verb.add_option("--ship", a.ship,
+                  "Instead: measure the front that --budget and --target-rmse of `reconstruct` choose by, on "
+                  "simulated flames, and write it to this file (recon/pipeline/reference_front.inc)");
+  verb.set_action([arguments] { tradeoff_recon(*arguments); });
 }
 
 }  // namespace
 
-void add_tradeoff(CLI::App& app) {
-  CLI::App* verb = app.add_subcommand("tradeoff", "Work-precision diagrams: what accuracy costs");
-  verb->require_subcommand(1);
-  add_recon(*verb);
-  add_tradeoff_sync(*verb);
-  add_tradeoff_rig(*verb);
+void add_tradeoff(const Verb& app) {
+  const Verb verb = app.add_verb("tradeoff", "Work-precision diagrams: what accuracy costs");
+  verb.require_verb();
+  add_recon(verb);
+  add_tradeoff_sync(verb);
+  add_tradeoff_rig(verb);
 }
 
 }  // namespace emberlock::cli

@@ -6,12 +6,12 @@
 #include "cli/manual.h"
 
 int main(int argc, char** argv) {
-  CLI::App app{
-      "Emberlock: locks cameras without trigger hardware, films flames with them, reconstructs the volume.",
-      "emberlock"};
-  app.require_subcommand(1);
+  const emberlock::cli::CommandLine line(
+      "Emberlock: locks cameras without trigger hardware, films flames with them, reconstructs the volume.");
+  const emberlock::cli::Verb& app = line.program();
+  app.require_verb();
   emberlock::cli::style_help(app);
-  app.set_version_flag("--version", "emberlock " + emberlock::version());
+  app.add_version_flag("emberlock " + emberlock::version());
 #if EMBERLOCK_WITH_DRIVERS
   emberlock::cli::add_devices(app);
 #endif
@@ -53,5 +53,5 @@ int main(int argc, char** argv) {
 #endif
   emberlock::cli::add_help(app);
   emberlock::cli::add_manual(app, emberlock::version());
-  return emberlock::cli::run(app, argc, argv);
+  return emberlock::cli::run(line, argc, argv);
 }

@@ -101,24 +101,24 @@ void verify(const VerifyArguments& arguments) {
     std::fprintf(stderr, "emberlock: the report is %s\n",
                  (std::filesystem::path(arguments.out) / "report.html").c_str());
   }
-  if (run.result.verdict != smear::ClipsVerdict::in_sync) throw CLI::RuntimeError(1);
+  if (run.result.verdict != smear::ClipsVerdict::in_sync) throw Exit(1);
 }
 
 }  // namespace
 
-void add_verify(CLI::App& app) {
+void add_verify(const Verb& app) {
   auto a = std::make_shared<VerifyArguments>();
-  CLI::App* verb = app.add_subcommand("verify",
-                                      "Verifies video files of cameras that filmed one strobe: whether they "
-                                      "are in sync, by how much, and which frames belong together.");
-  verb->add_option("clips", a->clips, "one video per camera, the reference first")->required();
-  add_clip_options(*verb, a->clip)->required();
-  verb->add_option("--tolerance", a->tolerance,
-                   "largest distance from the reference, to either side: 100rows, 5.4ms or 500us [0.5ms, as "
-                   "`align` takes it for a flame of 2 m/s]");
-  verb->add_flag("--json", a->json, "the verdict as JSON on stdout");
-  verb->add_option("--out", a->out, "write report.html, with frames, fits and residuals, to this folder");
-  verb->callback([a] { verify(*a); });
+  const Verb verb = app.add_verb("verify",
+                                 "Verifies video files of cameras that filmed one strobe: whether they "
+                                 "are in sync, by how much, and which frames belong together.");
+  verb.add_option("clips", a->clips, "one video per camera, the reference first").require();
+  add_clip_options(verb, a->clip).require();
+  verb.add_option("--tolerance", a->tolerance,
+                  "largest distance from the reference, to either side: 100rows, 5.4ms or 500us [0.5ms, as "
+                  "`align` takes it for a flame of 2 m/s]");
+  verb.add_flag("--json", a->json, "the verdict as JSON on stdout");
+  verb.add_option("--out", a->out, "write report.html, with frames, fits and residuals, to this folder");
+  verb.set_action([a] { verify(*a); });
 }
 
 }  // namespace emberlock::cli

@@ -200,18 +200,18 @@ Status verify_volume(const VerifyVolumeArguments& a) {
 
 }  // namespace
 
-void add_verify_volume(CLI::App& app) {
+void add_verify_volume(const Verb& app) {
   auto arguments = std::make_shared<VerifyVolumeArguments>();
-  CLI::App* verb = app.add_subcommand("verify-volume",
-                                      "Says what a volume's certificate says, and whether it holds. Exit "
-                                      "code 1: it doesn't; 2: there is none");
-  verb->add_option("VOLUME", arguments->volume, "A volume.vdb, or a flame.vdb of `export`")->required();
-  verb->add_option("--session", arguments->session,
-                   "The session's folder: also compares its files with those that the volume was made of");
-  verb->add_option("--public-key", arguments->public_key,
-                   "The public Ed25519 key (PEM) that must have signed it");
-  verb->add_flag("--json", arguments->json, "One JSON object");
-  verb->callback([arguments] { or_fail(verify_volume(*arguments)); });
+  const Verb verb = app.add_verb("verify-volume",
+                                 "Says what a volume's certificate says, and whether it holds. Exit "
+                                 "code 1: it doesn't; 2: there is none");
+  verb.add_option("VOLUME", arguments->volume, "A volume.vdb, or a flame.vdb of `export`").require();
+  verb.add_option("--session", arguments->session,
+                  "The session's folder: also compares its files with those that the volume was made of");
+  verb.add_option("--public-key", arguments->public_key,
+                  "The public Ed25519 key (PEM) that must have signed it");
+  verb.add_flag("--json", arguments->json, "One JSON object");
+  verb.set_action([arguments] { or_fail(verify_volume(*arguments)); });
 }
 
 }  // namespace emberlock::cli

@@ -92,10 +92,10 @@ Result<std::vector<ResultVolume>> volumes_to_view(const fs::path& result) {
   return volumes;
 }
 
-Status check_used(const ViewArguments& a, const CLI::App& verb, bool viewer) {
+Status check_used(const ViewArguments& a, const Verb& verb, bool viewer) {
   if (viewer) return {};
   for (const char* option : {"--out", "--float32", "--input", "--rig"})
-    if (verb.count(option) > 0)
+    if (verb.is_given(option))
       return Error{ErrorKind::bad_input, "changes nothing here: there is no volume to show", option,
                    a.report ? "Leave --report away" : "Name the folder of a reconstruction"};
   return {};
@@ -110,7 +110,7 @@ fs::path viewer_place(const ViewArguments& a) {
   return fs::absolute(folder / "view.html");
 }
 
-Status view(const ViewArguments& a, const CLI::App& verb) try {
+Status view(const ViewArguments& a, const Verb& verb) try {
   std::vector<ResultVolume> volumes;
   if (!a.report) {
     EMBERLOCK_ASSIGN_OR_RETURN(volumes, volumes_to_view(a.result));
@@ -141,25 +141,25 @@ Status view(const ViewArguments& a, const CLI::App& verb) try {
 
 }  // namespace
 
-void add_view(CLI::App& app) {
+void add_view(const Verb& app) {
   auto arguments = std::make_shared<ViewArguments>();
   ViewArguments& a = *arguments;
-  CLI::App* verb = app.add_subcommand(
+  const Verb verb = app.add_verb(
       "view",
       "Shows a result in the browser: the volume to turn, in slices and over time, its cameras and errors; "
       "of results without a volume the report. Without a display it only says where the page is");
-  verb->add_option("RESULT", a.result, "The folder of a result, a volume.vdb, or a page")->required();
-  verb->add_option("--out", a.out,
-                   "HTML file for the page, which needs no other file; it isn't opened then [view.html in "
-                   "the result's folder]");
-  verb->add_flag("--report", a.report, "Opens the report page instead");
-  verb->add_flag_callback(
+  verb.add_option("RESULT", a.result, "The folder of a result, a volume.vdb, or a page").require();
+  verb.add_option("--out", a.out,
+                  "HTML file for the page, which needs no other file; it isn't opened then [view.html in "
+                  "the result's folder]");
+  verb.add_flag("--report", a.report, "Opens the report page instead");
+  verb.add_flag_function(
       "--float32", [&a] { a.options.stored = report::Stored::float32; },
       "Holds the values bit for bit; otherwise as halves, to 0.05 %, in a smaller page");
-  verb->add_option("--input", a.options.input,
-                   "Session or transforms.json whose cameras are shown [what was reconstructed]");
-  verb->add_option("--rig", a.options.rig, "rig.json that stands before a session's own calibration");
-  verb->callback([arguments, verb] { or_fail(view(*arguments, *verb)); });
+  verb.add_option("--input", a.options.input,
+                  "Session or transforms.json whose cameras are shown [what was reconstructed]");
+  verb.add_option("--rig", a.options.rig, "rig.json that stands before a session's own calibration");
+  verb.set_action([arguments, verb] { or_fail(view(*arguments, verb)); });
 }
 
 }  // namespace emberlock::cli

@@ -127,16 +127,16 @@ void watch(const WatchArguments& arguments) {
 
 }  // namespace
 
-void add_watch(CLI::App& app) {
+void add_watch(const Verb& app) {
   auto arguments = std::make_shared<WatchArguments>();
-  CLI::App* verb = app.add_subcommand("watch",
-                                      "Follows the daemon from now until Ctrl-C: its states, its journal, "
-                                      "every iteration of a reconstruction, every live volume");
-  add_daemon_options(*verb, arguments->daemon);
-  verb->add_option("--seconds", arguments->seconds, "End after so many seconds")->check(CLI::PositiveNumber);
-  verb->add_flag("--json", arguments->json,
-                 "One object per line: {\"status\": ...}, {\"notice\": ...} or {\"iteration\": ...}");
-  verb->callback([arguments] { watch(*arguments); });
+  const Verb verb = app.add_verb("watch",
+                                 "Follows the daemon from now until Ctrl-C: its states, its journal, "
+                                 "every iteration of a reconstruction, every live volume");
+  add_daemon_options(verb, arguments->daemon);
+  verb.add_option("--seconds", arguments->seconds, "End after so many seconds").check_positive();
+  verb.add_flag("--json", arguments->json,
+                "One object per line: {\"status\": ...}, {\"notice\": ...} or {\"iteration\": ...}");
+  verb.set_action([arguments] { watch(*arguments); });
 }
 
 }  // namespace emberlock::cli

@@ -45,7 +45,7 @@ class VerbsOfADaemon : public testing::Test {
     for (std::thread& thread : threads_) thread.join();
   }
 
-  VerbRun run(void (*add)(CLI::App&), std::vector<std::string> words) const {
+  VerbRun run(AddVerb add, std::vector<std::string> words) const {
     words.insert(words.end(), {"--daemon", "unix:" + (folder_ / "socket").string()});
     return run_verb(add, std::move(words));
   }

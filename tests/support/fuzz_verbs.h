@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <cstdio>
@@ -11,9 +10,9 @@
 #include <fstream>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
-#include <CLI/CLI.hpp>
 #if defined(__clang__)
 #include <sanitizer/common_interface_defs.h>
 #endif
@@ -41,19 +40,18 @@ class VerbBench {
   [[nodiscard]] const std::filesystem::path& folder() const { return folder_; }
 
   /// A verb with no memory of the one before.
-  int run(void (*add)(CLI::App&), std::vector<std::string> words) {
+  int run(void (*add)(const cli::Verb&), std::vector<std::string> words) {
     std::filesystem::remove_all(folder_ / "out");
-    std::reverse(words.begin(), words.end());  // CLI11 takes them last first
-    CLI::App app{"", "emberlock"};
-    add(app);
+    const cli::CommandLine line;
+    add(line.program());
     const int out = redirect(STDOUT_FILENO);
     const int err = redirect(STDERR_FILENO);
     int code = 0;
     std::string escaped;  // what no verb may let out
     try {
-      app.parse(words);
-    } catch (const CLI::RuntimeError& e) {
-      code = e.get_exit_code();
+      line.parse(std::move(words));
+    } catch (const cli::Exit& e) {
+      code = e.code;
     } catch (const std::exception& e) {
       escaped = std::string("an exception: ") + e.what();
     }

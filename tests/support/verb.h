@@ -1,14 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <algorithm>
 #include <filesystem>
 #include <string>
+#include <utility>
 #include <vector>
 
-#include <CLI/CLI.hpp>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+
+#include "cli/command_line.h"
 
 namespace emberlock::test {
 
@@ -19,18 +20,18 @@ struct VerbRun {
 };
 
 /// `emberlock WORDS...`, as main() runs it, with the one verb that `add` adds.
-inline VerbRun run_verb(void (*add)(CLI::App&), std::vector<std::string> words) {
-  std::reverse(words.begin(), words.end());  // CLI11 takes them last first
-  CLI::App app{"", "emberlock"};
-  add(app);
+using AddVerb = void (*)(const cli::Verb&);
+inline VerbRun run_verb(AddVerb add, std::vector<std::string> words) {
+  const cli::CommandLine line;
+  add(line.program());
   VerbRun result;
   testing::internal::CaptureStdout();
   testing::internal::CaptureStderr();
   try {
-    app.parse(words);
-  } catch (const CLI::RuntimeError& e) {
-    result.exit_code = e.get_exit_code();
-  } catch (const CLI::ParseError& e) {
+    line.parse(std::move(words));
+  } catch (const cli::Exit& e) {
+    result.exit_code = e.code;
+  } catch (const cli::UsageError& e) {
     result.exit_code = 2;
     result.err = e.what();
   }

@@ -44,7 +44,7 @@ using Words = std::vector<std::string>;
 struct Writer {
   const char* verb;    ///< as its results name it
   const char* option;  ///< before the folder; empty where it stands alone
-  void (*add)(CLI::App&);
+  test::AddVerb add;
   Words words;
   fs::path input;  ///< one file that it reads; none where it reads none
   std::set<std::string> makes;
@@ -347,25 +347,24 @@ TEST_F(OutputFolders, TheTablesHoldEveryVerbThatWritesOne) {
       listed.insert(std::string("emberlock ") + (plan ? "reconstruct" : writer.verb) + " " + writer.option);
     }
   }
-  CLI::App app{"", "emberlock"};
+  const CommandLine line;
   for (const auto add :
        {add_devices, add_smear,    add_align,  add_reconstruct, add_verify,  add_tradeoff, add_calibrate,
         add_import,  add_demo,     add_sample, add_doctor,      add_bench,   add_sessions, add_status,
         add_jobs,    add_watch,    add_record, add_strobe,      add_measure, add_simulate, add_render,
         add_export,  add_evaluate, add_scene,  add_ar,          add_stylize, add_batch,    add_design})
-    add(app);
+    add(line.program());
   std::set<std::string> found;
-  cli::visit(app, "emberlock", [&](const CLI::App& verb, const std::string& path) {
-    for (const CLI::Option* option : cli::options_of(verb)) {
-      const std::string words = option->get_description();
-      const bool folder = words.find("older") != std::string::npos || option->check_lname("out");
-      const bool reads = option->get_positional() || option->check_lname("strobe") ||
-                         option->check_lname("camera") || option->check_lname("mask") ||
-                         option->check_lname("depth") || option->check_lname("rig") ||
-                         option->check_lname("backups");
-      if (folder && !reads) found.insert(path + " " + option->get_name());
+  const VerbWords tree = describe_tree(line.program());
+  for (const VerbWords* verb : list_verbs(tree)) {
+    for (const OptionWords& option : verb->options) {
+      static const std::set<std::string> kRead{"--strobe", "--camera", "--mask",
+                                               "--depth",  "--rig",    "--backups"};
+      const bool folder = option.description.find("older") != std::string::npos || option.name == "--out";
+      const bool reads = option.long_names.empty() || kRead.contains(option.name);
+      if (folder && !reads) found.insert(verb->path + " " + option.name);
     }
-  });
+  }
   EXPECT_EQ(found, listed);
 }
 

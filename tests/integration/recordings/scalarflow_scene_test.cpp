@@ -30,7 +30,7 @@ class ScalarFlowScene : public testing::Test {
          "--effects", effects, "--device", "cpu", "--out", (temp_ / "smoke").string()});
     ASSERT_EQ(done.exit_code, 0) << done.err;
   }
-  [[nodiscard]] test::VerbRun draw(void (*verb)(CLI::App&), std::vector<std::string> words,
+  [[nodiscard]] test::VerbRun draw(test::AddVerb verb, std::vector<std::string> words,
                                    const std::string& out) const {
     words.insert(words.end(), {"--image", "120x200", "--format", "exr", "--out", (temp_ / out).string()});
     return test::run_verb(verb, std::move(words));

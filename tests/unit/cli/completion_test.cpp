@@ -24,13 +24,13 @@ using ::testing::UnorderedElementsAre;
 class Completion : public ::testing::Test {
  protected:
   Completion() {
-    app_.set_version_flag("--version", "1");
-    add_devices(app_);
-    add_align(app_);
-    add_manual(app_, "1");
-    std::ofstream(folder_ / "bash") << bash_completion(app_);
-    std::ofstream(folder_ / "zsh") << zsh_completion(app_);
-    std::ofstream(folder_ / "fish") << fish_completion(app_);
+    program_.add_version_flag("1");
+    add_devices(program_);
+    add_align(program_);
+    add_manual(program_, "1");
+    std::ofstream(folder_ / "bash") << bash_completion(program_);
+    std::ofstream(folder_ / "zsh") << zsh_completion(program_);
+    std::ofstream(folder_ / "fish") << fish_completion(program_);
     std::ofstream(folder_ / "a_file");
   }
 
@@ -66,7 +66,8 @@ class Completion : public ::testing::Test {
   }
 
   test::TempFolder folder_;
-  CLI::App app_{"What it is.", "emberlock"};
+  CommandLine line_{"What it is."};
+  Verb program_ = line_.program();
 };
 
 TEST_F(Completion, BashOffersVerbsTheirVerbsAndTheirOptions) {

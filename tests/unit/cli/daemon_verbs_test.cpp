@@ -29,7 +29,7 @@ using DaemonVerbs = test::VerbsOfADaemon;
 TEST(DaemonVerbsAlone, WithoutADaemonTheySayWhatToDoAndLeaveWithThree) {
   const test::TempFolder folder;
   const std::string nobody = "unix:" + (folder / "socket").string();
-  for (const auto& [add, words] : std::vector<std::pair<void (*)(CLI::App&), std::vector<std::string>>>{
+  for (const auto& [add, words] : std::vector<std::pair<test::AddVerb, std::vector<std::string>>>{
            {add_status, {"status"}},
            {add_watch, {"watch"}},
            {add_console, {"console"}},

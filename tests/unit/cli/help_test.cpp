@@ -18,14 +18,14 @@ using ::testing::Not;
 class Help : public ::testing::Test {
  protected:
   Help() {
-    app_.require_subcommand(1);
-    style_help(app_);
-    add_devices(app_);
-    add_align(app_);
-    add_calibrate(app_);
-    add_reconstruct(app_);
-    add_doctor(app_);
-    add_help(app_);
+    program_.require_verb();
+    style_help(program_);
+    add_devices(program_);
+    add_align(program_);
+    add_calibrate(program_);
+    add_reconstruct(program_);
+    add_doctor(program_);
+    add_help(program_);
   }
   struct Said {
     int code = 0;
@@ -40,12 +40,13 @@ class Help : public ::testing::Test {
     testing::internal::CaptureStdout();
     testing::internal::CaptureStderr();
     Said said;
-    said.code = run(app_, static_cast<int>(argv.size()), argv.data());
+    said.code = run(line_, static_cast<int>(argv.size()), argv.data());
     said.out = testing::internal::GetCapturedStdout();
     said.err = testing::internal::GetCapturedStderr();
     return said;
   }
-  CLI::App app_{"What it is.", "emberlock"};
+  CommandLine line_{"What it is."};
+  Verb program_ = line_.program();
 };
 
 TEST_F(Help, WithoutAVerbItSaysWhichThereAreInGroups) {

@@ -118,7 +118,7 @@ TEST(HostsWords, AListedSessionSaysWhereItsPartsAreAndWhoLedIt) {
 class HostsVerbs : public test::GrpcServerTest {
  protected:
   HostsVerbs() { serve(); }
-  test::VerbRun run(void (*add)(CLI::App&), std::vector<std::string> words) const {
+  test::VerbRun run(test::AddVerb add, std::vector<std::string> words) const {
     words.insert(words.end(), {"--daemon", "unix:" + socket.string()});
     return test::run_verb(add, std::move(words));
   }

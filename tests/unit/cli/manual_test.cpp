@@ -21,16 +21,17 @@ using ::testing::Not;
 class Manual : public ::testing::Test {
  protected:
   Manual() {
-    app_.set_version_flag("--version", "1");
-    add_devices(app_);
-    add_align(app_);
-    add_manual(app_, "1");
+    program_.add_version_flag("1");
+    add_devices(program_);
+    add_align(program_);
+    add_manual(program_, "1");
   }
-  CLI::App app_{"What it is.", "emberlock"};
+  CommandLine line_{"What it is."};
+  Verb program_ = line_.program();
 };
 
 TEST_F(Manual, ThePageHoldsEveryVerbAndOptionThatHelpShows) {
-  const std::string page = manual_page(app_, "1");
+  const std::string page = manual_page(program_, "1");
   for (const char* part :
        {"emberlock devices probe", "\\-\\-reset\\-seconds", "\\-\\-control", "What it is."})
     EXPECT_THAT(page, HasSubstr(part));
@@ -41,7 +42,7 @@ TEST_F(Manual, ThePageHoldsEveryVerbAndOptionThatHelpShows) {
 TEST_F(Manual, PagesAreGoodRoff) {
   const test::TempFolder folder;
   const fs::path page = folder / "page.roff";
-  for (const std::string& text : {manual_page(app_, "1"), rig::config_manual("1")}) {
+  for (const std::string& text : {manual_page(program_, "1"), rig::config_manual("1")}) {
     std::ofstream(page) << text;
     EXPECT_EQ(shell("LC_ALL=C.UTF-8 groff -man -Tutf8 -ww -z '" + page.string() + "' 2>&1").output, "");
     const std::string shown =

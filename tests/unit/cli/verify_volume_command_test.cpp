@@ -28,7 +28,7 @@ using testing::HasSubstr;
 using testing::Not;
 using Words = std::vector<std::string>;
 
-test::VerbRun run_words(void (*add)(CLI::App&), const char* verb, const fs::path& what, Words words) {
+test::VerbRun run_words(test::AddVerb add, const char* verb, const fs::path& what, Words words) {
   words.insert(words.begin(), {verb, what.string()});
   return test::run_verb(add, std::move(words));
 }

@@ -23,27 +23,27 @@ void count_frames(const CountArguments& arguments) {
   std::printf("%zu cameras\n", reader.camera_count());
 }
 
-void add_count(CLI::App& app) {
+void add_count(const Verb& app) {
   auto arguments = std::make_shared<CountArguments>();
-  CLI::App* verb = app.add_subcommand("count", "Says how many cameras a session has");
-  verb->add_option("SESSION", arguments->session, "The session's folder")->required();
-  verb->callback([arguments] { count_frames(*arguments); });
+  const Verb verb = app.add_verb("count", "Says how many cameras a session has");
+  verb.add_option("SESSION", arguments->session, "The session's folder").require();
+  verb.set_action([arguments] { count_frames(*arguments); });
 }
 
 TEST(ExampleVerb, PrintsOnStdoutAndLeavesWithTwoWhereItsInputIsBad) {
   const test::TempFolder temp;
   test::record(temp / "take", {{64, 48}, PixelFormat::gray8, 8}, 5, test::small_disk_options());
-  CLI::App app;
-  add_count(app);
+  const CommandLine line;
+  add_count(line.program());
   testing::internal::CaptureStdout();
-  app.parse("count " + (temp / "take").string());
+  line.parse({"count", (temp / "take").string()});
   EXPECT_EQ(testing::internal::GetCapturedStdout(), "1 cameras\n");
   testing::internal::CaptureStderr();
   try {
-    app.parse("count " + (temp / "none").string());
+    line.parse({"count", (temp / "none").string()});
     ADD_FAILURE() << "went on";
-  } catch (const CLI::RuntimeError& left) {
-    EXPECT_NE(left.get_exit_code(), 0);
+  } catch (const Exit& left) {
+    EXPECT_NE(left.code, 0);
   }
   EXPECT_NE(testing::internal::GetCapturedStderr().find("none"), std::string::npos);
 }

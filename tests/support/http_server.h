@@ -32,7 +32,8 @@ class HttpServerTest : public testing::Test {
     const daemon::HttpServerOptions usual;
     if (options.listen == usual.listen) options.listen = "127.0.0.1:0";
     // No client is cut off because the machine is busy.
-    if (options.patience == usual.patience) options.patience = Seconds(static_cast<double>(kHangGuard.count()));
+    if (options.patience == usual.patience)
+      options.patience = Seconds(static_cast<double>(kHangGuard.count()));
     options.console = folder / "console";
     auto started = daemon::HttpServer::start(api, std::move(options));
     ASSERT_TRUE(started.ok()) << started.error().message();
@@ -49,7 +50,8 @@ class HttpServerTest : public testing::Test {
   /// What comes until it has these words, or the server ends.
   static std::string read_until(const UniqueFd& client, const std::string& words) {
     std::string answer;
-    for (char c = 0; answer.find(words) == std::string::npos && ::read(client.get(), &c, 1) == 1;) answer += c;
+    for (char c = 0; answer.find(words) == std::string::npos && ::read(client.get(), &c, 1) == 1;)
+      answer += c;
     return answer;
   }
 

@@ -23,7 +23,8 @@ inline void put_message(const std::filesystem::path& file, const v1::ChildMessag
 }
 
 /// Makes a preview of nx x ny x nz key points in a cube of 1 m.
-inline void fill(v1::VolumePreview& volume, unsigned nx, unsigned ny, unsigned nz, const std::string& voxels) {
+inline void fill(v1::VolumePreview& volume, unsigned nx, unsigned ny, unsigned nz,
+                 const std::string& voxels) {
   volume.set_nx(nx);
   volume.set_ny(ny);
   volume.set_nz(nz);

@@ -41,6 +41,7 @@ class Daemon : public ::testing::Test {
   }
   test::TempFolder temp_;
 };
+using DaemonSlow = Daemon;
 
 TEST_F(Daemon, FromColdToLocked) {
   SmallDaemon daemon(small_config(temp_.path()));
@@ -285,7 +286,7 @@ TEST_F(Daemon, StoppedInMidAlignmentItIsIdleAtOnce) {
   EXPECT_EQ(daemon.conductor->strobe()->output(), v1::StrobeState::OFF);
 }
 
-TEST_F(Daemon, TheLockHoldsAsLongAsItIsSaidTo) {
+TEST_F(DaemonSlow, TheLockHoldsAsLongAsItIsSaidTo) {
   for (const std::uint64_t seed : {1, 2, 3}) {
     rig::DaemonConfig config = small_config(temp_ / std::to_string(seed));
     config.rig.virtual_rig.draw.seed = seed;
@@ -302,7 +303,7 @@ TEST_F(Daemon, TheLockHoldsAsLongAsItIsSaidTo) {
   }
 }
 
-TEST_F(Daemon, NoCamerasTrulyLieFartherApartBeforeThePromiseIsOverAndTwiceThatWouldBeTooLong) {
+TEST_F(DaemonSlow, NoCamerasTrulyLieFartherApartBeforeThePromiseIsOverAndTwiceThatWouldBeTooLong) {
   int too_long_if_doubled = 0;
   for (const std::uint64_t seed : {1, 2, 3, 4}) {
     rig::DaemonConfig config = small_config(temp_ / std::to_string(seed));

@@ -22,8 +22,8 @@ class LiveArProgramTest : public testing::Test {
  protected:
   LiveArProgramTest() {
     film_.lens = {kFilmed, 320, 320, 159, 121, {-0.1, 0, 0, 0, 0}};
-    film_.rate = 5;
-    film_.frames = 900;  // three minutes: a busy machine takes its time until the flame is shown
+    film_.rate = 3;
+    film_.frames = 900;  // five minutes: a busy machine takes its time until the flame is shown
     film_.drawn = 60;
     film_.look.samples = 2;
     test::record_marker(temp_ / "film", film_);
@@ -43,6 +43,16 @@ class LiveArProgramTest : public testing::Test {
     auto engine = daemon::Engine::start(config_, board_, [](const std::string&, const Frame&) {});
     ASSERT_TRUE(engine.ok()) << engine.error().message();
     engine_ = std::move(*engine);
+  }
+  /// Shows the flame. A busy machine may take longer than the engine waits: then again, as its error asks.
+  v1::ArStatus show() {
+    Result<v1::ArStatus> shown = Error{};
+    test::wait_until([&] {
+      shown = engine_->start_ar(request_);
+      return shown.ok() || shown.error().message().find("told nothing") == std::string::npos;
+    });
+    EXPECT_TRUE(shown.ok()) << shown.error().message();
+    return shown.ok() ? *shown : v1::ArStatus();
   }
   /// So many pictures with a pose, by frame.
   std::map<std::uint64_t, cv::Mat> pictures(std::size_t count, v1::ArStatus::Pose pose) {
@@ -70,8 +80,7 @@ class LiveArProgramTest : public testing::Test {
 TEST_F(LiveArProgramTest, TheFlameStandsOnTheMarkerAndWhatIsRecordedIsAsFilmed) {
   start();
   const daemon::Subscription watcher = board_.want_pictures();
-  const auto shown = engine_->start_ar(request_);
-  ASSERT_TRUE(shown.ok()) << shown.error().message();
+  ASSERT_EQ(show().state(), v1::ArStatus::SHOWN);
   v1::RecordRequest take;
   take.set_name("take");
   take.set_unlocked(true);
@@ -102,11 +111,14 @@ TEST_F(LiveArProgramTest, TheFlameStandsOnTheMarkerAndWhatIsRecordedIsAsFilmed) 
     most = std::max(most, foot.x());
   }
   EXPECT_GT(most - least, 4) << "the camera moved meanwhile";
-  const v1::ArStatus status = board_.status()->ar();
+  v1::ArStatus status;
+  // On a busy machine there may be moments without pictures.
+  EXPECT_TRUE(test::wait_until([&] {
+    status = board_.status()->ar();
+    return status.rate_hz() > 0 && status.delay_s() > 0;
+  }));
   EXPECT_LT(status.residual_px(), 0.5);
   EXPECT_GT(status.residual_px(), 0);
-  EXPECT_GT(status.rate_hz(), 0);
-  EXPECT_GT(status.delay_s(), 0);
   ASSERT_TRUE(engine_->stop_recording().ok());
   ASSERT_TRUE(engine_->stop_ar().ok());
   auto original = session::SessionReader::open(temp_ / "film");
@@ -143,9 +155,7 @@ TEST_F(LiveArProgramTest, AMarkerOfAnotherNumberIsNamed) {
   const daemon::Subscription watcher = board_.want_pictures();
   request_.set_marker("aruco:4X4_50:8:80mm");
   request_.set_focal_px(320);
-  const auto shown = engine_->start_ar(request_);
-  ASSERT_TRUE(shown.ok()) << shown.error().message();
-  EXPECT_FALSE(shown->calibrated());
+  EXPECT_FALSE(show().calibrated());
   EXPECT_TRUE(test::wait_until([&] { return !board_.status()->ar().seen_instead().empty(); }));
   EXPECT_EQ(board_.status()->ar().pose(), v1::ArStatus::LOST);
   EXPECT_EQ(board_.status()->ar().seen_instead(), "a marker of 4X4_50, number 7");

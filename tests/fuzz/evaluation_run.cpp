@@ -1,14 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <cstddef>
-#include <cstdint>
 #include <cstdlib>
 #include <string>
 #include <string_view>
 
 #include "evaluate/paper/run_file.h"
+#include "tests/fuzz/target.h"
 
 // A run.json, by which an interrupted `evaluate paper` goes on.
-extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+FUZZ_TARGET(evaluation_run) {
   using namespace emberlock;
   const auto run = evaluate::parse_run({reinterpret_cast<const char*>(data), size}, "fuzz", "fuzz/run.json");
   if (!run) {

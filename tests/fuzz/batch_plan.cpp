@@ -1,14 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <cstddef>
-#include <cstdint>
 #include <cstdlib>
 #include <string_view>
 
 #include "recon/batch/plan.h"
 #include "recon/batch/pulse.h"
+#include "tests/fuzz/target.h"
 
 // What a batch's folder says of its plan and its workers, by which other ranks and later runs go on.
-extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+FUZZ_TARGET(batch_plan) {
   using namespace emberlock;
   const std::string_view text(reinterpret_cast<const char*>(data), size);
   if (const auto worker = recon::parse_worker(text, "fuzz/worker")) {

@@ -3,13 +3,14 @@
 
 #include <cmath>
 #include <cstddef>
-#include <cstdint>
 #include <cstdlib>
 #include <string_view>
 
+#include "tests/fuzz/target.h"
+
 /// Whatever a response.json holds: an error that says where and what to do, or a valid response that is read
 /// back as it was.
-extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+FUZZ_TARGET(camera_response) {
   using namespace emberlock;
   const auto response =
       recon::parse_camera_response({reinterpret_cast<const char*>(data), size}, "fuzz/response.json");

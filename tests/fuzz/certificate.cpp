@@ -1,14 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "recon/export/certificate.h"
 
-#include <cstddef>
-#include <cstdint>
 #include <cstdlib>
 #include <sstream>
 #include <string>
 #include <string_view>
 
 #include "recon/export/vdb_header.h"
+#include "tests/fuzz/target.h"
 
 namespace {
 
@@ -28,7 +27,7 @@ void check_round_trip(const Certificate& certificate,
 }  // namespace
 
 // A certificate's text, of a session or a volume, and the header of a volume in which it lies.
-extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+FUZZ_TARGET(certificate) {
   const std::string bytes(reinterpret_cast<const char*>(data), size);
   std::istringstream file(bytes);
   const auto found = recon::find_vdb_text(file, recon::kCertificateKey, "input");

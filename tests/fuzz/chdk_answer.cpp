@@ -9,6 +9,7 @@
 #include "drivers/ptp/chdk.h"
 #include "drivers/ptp/live_view.h"
 #include "drivers/virtual/virtual_clock.h"
+#include "tests/fuzz/target.h"
 
 namespace emberlock {
 namespace {
@@ -66,7 +67,7 @@ void talk(std::span<const std::byte> bytes) {
 
 // Whatever a camera answers to CHDK's questions: an error or values, and pictures that lie within what was
 // sent. The first byte chooses between a picture alone and a whole conversation.
-extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+FUZZ_TARGET(chdk_answer) {
   if (size == 0) return 0;
   const auto bytes = std::as_bytes(std::span(data + 1, size - 1));
   data[0] % 2 == 0 ? emberlock::look_at(bytes) : emberlock::talk(bytes);

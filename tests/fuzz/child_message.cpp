@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <cstddef>
-#include <cstdint>
 #include <cstdlib>
 #include <string_view>
 #include <utility>
@@ -8,9 +7,10 @@
 #include "daemon/live/state.h"
 #include "daemon/reconstruction/state.h"
 #include "session/child_messages.h"
+#include "tests/fuzz/target.h"
 
 // What a reconstruction's child, or that of live volumes, sends the daemon, in two pieces.
-extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+FUZZ_TARGET(child_message) {
   using namespace emberlock;
   const std::string_view bytes(reinterpret_cast<const char*>(data), size);
   daemon::ReconstructionState state{v1::ReconstructionStatus()};

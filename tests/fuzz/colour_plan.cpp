@@ -1,12 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <cstddef>
-#include <cstdint>
 #include <cstdlib>
 
 #include "recon/preprocess/colour_readings.h"
+#include "tests/fuzz/target.h"
 
 /// Whatever a colour.json holds: an error that says where and what to do, or rectangles with extent.
-extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+FUZZ_TARGET(colour_plan) {
   using namespace emberlock;
   const auto plan = recon::parse_colour_plan({reinterpret_cast<const char*>(data), size}, "fuzz/colour.json");
   if (!plan) {

@@ -1,15 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "rig/config/config.h"
 
-#include <cstddef>
-#include <cstdint>
 #include <cstdlib>
 #include <string>
 #include <string_view>
 
+#include "tests/fuzz/target.h"
+
 /// Whatever a configuration file holds: problems, each with its place and a remedy, or a configuration that
 /// says the same when it is printed and read again.
-extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+FUZZ_TARGET(config) {
   using namespace emberlock;
   const std::filesystem::path file = "/fuzz/emberlockd.toml";
   const rig::ConfigReading once = rig::read_config({reinterpret_cast<const char*>(data), size}, file);

@@ -2,13 +2,13 @@
 #include "cli/design_files.h"
 
 #include <cmath>
-#include <cstddef>
-#include <cstdint>
 #include <cstdlib>
 #include <string_view>
 
+#include "tests/fuzz/target.h"
+
 // What other machines' `bench` and earlier designs left, from which `design` goes on.
-extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+FUZZ_TARGET(design_files) {
   using namespace emberlock;
   const std::string_view text(reinterpret_cast<const char*>(data), size);
   const auto bench = cli::parse_bench_file(text, "fuzz/bench.json");

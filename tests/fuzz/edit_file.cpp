@@ -1,15 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "apply/edit_file.h"
 
-#include <cstddef>
-#include <cstdint>
 #include <cstdlib>
 #include <string_view>
 #include <variant>
 
+#include "tests/fuzz/target.h"
+
 // An edit file: what is read from it can be written and read again as the same, and stands; what can't has an
 // error that says where. A step of somebody who may name no files names none.
-extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+FUZZ_TARGET(edit_file) {
   using namespace emberlock;
   const std::string_view bytes(reinterpret_cast<const char*>(data), size);
   const auto foreign = apply::parse_foreign_operation(bytes, "fuzz", apply::GivenPictures{"given.png"});

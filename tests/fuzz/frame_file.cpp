@@ -2,16 +2,16 @@
 #include "session/media/frame_file.h"
 
 #include <cstddef>
-#include <cstdint>
 #include <string>
 
 #include <sys/mman.h>
 #include <unistd.h>
 
 #include "base/unique_fd.h"
+#include "tests/fuzz/target.h"
 
 // Whatever a file holds, opening and reading it ends in frames or in an error.
-extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+FUZZ_TARGET(frame_file) {
   static const emberlock::UniqueFd file(::memfd_create("input", MFD_CLOEXEC));
   static const std::string path = "/proc/self/fd/" + std::to_string(file.get());
   if (::ftruncate(file.get(), 0) != 0) return 0;

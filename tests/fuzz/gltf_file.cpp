@@ -7,8 +7,10 @@
 #include <cstdlib>
 #include <string>
 
+#include "tests/fuzz/target.h"
+
 // A glTF file, text or binary: its triangles have finite corners that are there, and a material.
-extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+FUZZ_TARGET(gltf_file) {
   using namespace emberlock;
   apply::Mesh mesh;
   const auto scene = apply::parse_gltf({reinterpret_cast<const char*>(data), size}, "fuzz.gltf", {}, mesh);

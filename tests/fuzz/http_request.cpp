@@ -4,13 +4,13 @@
 #include <algorithm>
 #include <array>
 #include <cstddef>
-#include <cstdint>
 #include <cstdlib>
 #include <string>
 #include <string_view>
 
 #include "daemon/server/json_api.h"
 #include "daemon/server/watch_messages.h"
+#include "tests/fuzz/target.h"
 #include "tests/support/fake_api.h"
 
 namespace {
@@ -81,7 +81,7 @@ void wish(std::string_view text) {
 
 // The first byte chooses what is read: a head (target, Host, Origin, Authorization, Cookie: a line each), a
 // call (method, then the body), or a console's message.
-extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+FUZZ_TARGET(http_request) {
   if (size == 0) return 0;
   const std::string_view text(reinterpret_cast<const char*>(data) + 1, size - 1);
   switch (data[0]) {

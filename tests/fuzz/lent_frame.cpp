@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "daemon/hosts/lent_frame.h"
 
-#include <cstddef>
-#include <cstdint>
 #include <cstdlib>
+
+#include "tests/fuzz/target.h"
 
 /// Whatever another host sends for a frame: an error that says where and what to do, or a picture of the size
 /// that it claims, which goes on as it came.
-extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+FUZZ_TARGET(lent_frame) {
   using namespace emberlock;
   v1::LentFrame lent;
   if (size > 4096 || !lent.ParseFromArray(data, static_cast<int>(size))) return 0;

@@ -1,15 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
-#include <cstddef>
-#include <cstdint>
 #include <cstdlib>
 #include <span>
 
 #include "drivers/ptp/container.h"
+#include "tests/fuzz/target.h"
 
 // Whatever a device sends: an error, or what encodes to the same bytes again; and datasets no longer than the
 // bytes can hold. The first byte says what the others are read as.
-extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+FUZZ_TARGET(ptp_container) {
   using namespace emberlock;
   if (size == 0) return 0;
   const auto bytes = std::as_bytes(std::span(data + 1, size - 1));

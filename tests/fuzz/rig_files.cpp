@@ -1,15 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <cmath>
 #include <cstddef>
-#include <cstdint>
 #include <cstdlib>
 #include <string_view>
 
 #include "recon/calibrate/board.h"
 #include "recon/calibrate/rig_formats.h"
+#include "tests/fuzz/target.h"
 
 // A rig's files: rig.json, and COLMAP's text, which a form feed parts into cameras.txt and images.txt.
-extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+FUZZ_TARGET(rig_files) {
   using namespace emberlock;
   const std::string_view bytes(reinterpret_cast<const char*>(data), size);
   const std::size_t cut = bytes.find('\f');

@@ -2,13 +2,13 @@
 #include "apply/scene_file.h"
 
 #include <cmath>
-#include <cstddef>
-#include <cstdint>
 #include <cstdlib>
 #include <string_view>
 
+#include "tests/fuzz/target.h"
+
 // A scene file: what is read from it is finite and in its range; what isn't has an error that says where.
-extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+FUZZ_TARGET(scene_file) {
   using namespace emberlock;
   const auto scene = apply::parse_scene({reinterpret_cast<const char*>(data), size}, "fuzz.json", "fuzz");
   if (!scene) {

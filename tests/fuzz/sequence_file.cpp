@@ -1,14 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <cstddef>
-#include <cstdint>
 #include <cstdlib>
 #include <string>
 #include <string_view>
 
 #include "report/sequence_report.h"
+#include "tests/fuzz/target.h"
 
 // A sequence's frames.json, by which an interrupted one goes on.
-extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+FUZZ_TARGET(sequence_file) {
   using namespace emberlock;
   const auto told = report::parse_sequence({reinterpret_cast<const char*>(data), size}, "fuzz/frames.json");
   if (!told) {

@@ -10,11 +10,11 @@
 
 #include <unistd.h>
 
-#include "rig/align/old_record.h"
 #include "rig/align/settings_proto.h"
 #include "session/reader.h"
 #include "session/salvage.h"
 #include "session/verify.h"
+#include "tests/fuzz/target.h"
 
 // A whole session, damaged: everything that reads one says what is good or why it can't, and agrees. The
 // input is the five files of a session one after the other, each behind its length as three bytes,
@@ -66,12 +66,7 @@ void expect(bool holds) {
 }
 
 void expect_settings_come_back(const v1::Event& event) {
-  const v1::AlignmentSettings first = [&]() -> v1::AlignmentSettings {
-    if (event.has_settings()) return event.settings();
-    const auto noted = rig::options_in_note(event.note());
-    return noted.ok() && *noted ? rig::to_proto(**noted) : v1::AlignmentSettings();
-  }();
-  const auto options = rig::align_options(first);
+  const auto options = rig::align_options(event.settings());
   if (!options.ok()) return;
   const v1::AlignmentSettings written = rig::to_proto(*options);
   const auto again = rig::align_options(written);
@@ -80,7 +75,7 @@ void expect_settings_come_back(const v1::Event& event) {
 
 }  // namespace
 
-extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+FUZZ_TARGET(session_folder) {
   unpack({reinterpret_cast<const char*>(data), size});
   const auto check = session::verify_session(folder());
   auto reader = session::SessionReader::open(folder());

@@ -1,13 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <cstddef>
-#include <cstdint>
 #include <cstdlib>
 #include <string_view>
 
 #include "session/index.h"
+#include "tests/fuzz/target.h"
 
 // Any bytes parse or are refused, and what was parsed encodes to records that parse again.
-extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+FUZZ_TARGET(session_index) {
   const auto parsed = emberlock::session::parse_index({reinterpret_cast<const char*>(data), size}, "input");
   if (!parsed.ok()) return 0;
   std::string again = emberlock::session::encode_index_header();

@@ -1,7 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <cmath>
-#include <cstddef>
-#include <cstdint>
 #include <cstdlib>
 #include <string_view>
 
@@ -9,9 +7,10 @@
 #include "session/files.h"
 #include "session/layout.h"
 #include "session/shutter_times.h"
+#include "tests/fuzz/target.h"
 
 // The protobuf files of a session: manifest and shutter times as JSON, and the events on the wire.
-extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+FUZZ_TARGET(session_manifest) {
   const std::string_view bytes(reinterpret_cast<const char*>(data), size);
   if (const auto manifest = emberlock::session::parse_manifest(bytes, "input"); manifest.ok()) {
     for (const auto& camera : manifest->cameras()) {

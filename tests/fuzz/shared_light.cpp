@@ -3,13 +3,13 @@
 
 #include <algorithm>
 #include <cstddef>
-#include <cstdint>
 #include <cstdlib>
 #include <string>
 #include <string_view>
 #include <vector>
 
 #include "drivers/virtual/virtual_strobe.h"
+#include "tests/fuzz/target.h"
 
 namespace {
 
@@ -35,7 +35,7 @@ std::vector<drivers::LightSetting> settings_in(std::string_view text, std::size_
 
 /// The first byte says in what parts the others come. Whatever a light file holds: an error that says where
 /// and what to do, or settings that a strobe can have, in order, which are read back as they were.
-extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+FUZZ_TARGET(shared_light) {
   if (size == 0 || size > 4096) return 0;
   const std::string_view text(reinterpret_cast<const char*>(data) + 1, size - 1);
   bool refused = false;

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <cmath>
-#include <cstddef>
 #include <cstdint>
 #include <cstdlib>
 #include <string>
@@ -9,6 +8,7 @@
 
 #include "drivers/strobe_serial/controller/protocol.h"
 #include "drivers/strobe_serial/dialect.h"
+#include "tests/fuzz/target.h"
 
 namespace {
 
@@ -79,7 +79,7 @@ void tell_controller(std::string_view bytes) {
 }  // namespace
 
 // The first byte chooses who reads: one of the dialects, or the controller's own parser.
-extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+FUZZ_TARGET(strobe_reply) {
   if (size == 0) return 0;
   const std::string_view bytes(reinterpret_cast<const char*>(data) + 1, size - 1);
   constexpr std::uint8_t kReaders = 6;

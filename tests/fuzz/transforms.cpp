@@ -2,13 +2,13 @@
 #include "recon/calibrate/transforms.h"
 
 #include <cmath>
-#include <cstddef>
-#include <cstdint>
 #include <cstdlib>
 #include <string_view>
 
+#include "tests/fuzz/target.h"
+
 /// Whatever a transforms.json holds: an error, or cameras that are finite and rigid.
-extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+FUZZ_TARGET(transforms) {
   using namespace emberlock;
   const auto transforms =
       recon::parse_transforms({reinterpret_cast<const char*>(data), size}, "fuzz/transforms.json");

@@ -2,7 +2,6 @@
 #include <algorithm>
 #include <cerrno>
 #include <cstddef>
-#include <cstdint>
 #include <cstdlib>
 #include <cstring>
 
@@ -10,10 +9,11 @@
 
 #include "drivers/v4l2/controls.h"
 #include "drivers/v4l2/modes.h"
+#include "tests/fuzz/target.h"
 
 // Whatever a device answers, the modes made of it can be filmed in. The input is its answers one after the
 // other: a byte that is 0 for "no more", else the whole answer.
-extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+FUZZ_TARGET(v4l2_formats) {
   using namespace emberlock;
   const drivers::Ioctl device = [&](unsigned long request, void* argument) {
     if (size == 0) return EINVAL;

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+#include "tests/fuzz/target.h"
 #include "tests/support/fuzz_verbs.h"
 
-extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
-  return emberlock::test::fuzz_reconstruct(data, size);
-}
+FUZZ_TARGET(verb_reconstruct) { return emberlock::test::fuzz_reconstruct(data, size); }

@@ -212,7 +212,7 @@ TEST_F(DaemonRecordingVerbs, NoLockIsRenewedForATakeThatItHoldsForOrThatIsAskedF
                                              {"record", "candle", "--seconds", "40"},
                                              {"record", "candle", "--seconds", "40", "--unlocked"},
                                              {"record", "candle", "--seconds", "40", "--no-renewal"}})
-    run(add_record, words);
+    EXPECT_EQ(run(add_record, words).exit_code, 0);
   for (const std::string& call : api_.calls()) EXPECT_THAT(call, HasSubstr("record"));
 }
 

@@ -17,14 +17,14 @@ constexpr int kHalvings = 24;
 constexpr Kelvin kColdestBesideLines{1000}, kHottestBesideLines{3000};
 constexpr double kSingular = 1e-10;
 constexpr int kMostEmitters = 1 + static_cast<int>(kMostLines);
-constexpr Unmixer::Choice kSoot = 1;
+constexpr Unmixer::Choice kWithSoot = 1;
 
 int emitters_in(Unmixer::Choice choice) {
   int n = 0;
   for (; choice != 0; choice &= choice - 1) ++n;
   return n;
 }
-int unknowns_in(Unmixer::Choice choice) { return emitters_in(choice) + ((choice & kSoot) != 0 ? 1 : 0); }
+int unknowns_in(Unmixer::Choice choice) { return emitters_in(choice) + ((choice & kWithSoot) != 0 ? 1 : 0); }
 
 /// Least squares of amounts that aren't negative: how much they lower chi-square.
 struct Lowered {
@@ -83,7 +83,7 @@ double Unmixer::chi_square(const Glow& glow, double kelvin, Choice choice, Amoun
   columns.col(0) = scale * Eigen::Vector3d::Map(levels.value.data());
   for (std::size_t i = 0; i < lines_.size(); ++i) {
     // What a line takes from a channel shows where there is something to take from.
-    const std::array<double, 3> line = (choice & kSoot) != 0 ? lines_[i] : shown_alone(lines_[i]);
+    const std::array<double, 3> line = (choice & kWithSoot) != 0 ? lines_[i] : shown_alone(lines_[i]);
     columns.col(static_cast<Eigen::Index>(i) + 1) = Eigen::Vector3d::Map(line.data());
   }
   const Eigen::Matrix3d weighted = glow.information * columns;
@@ -135,9 +135,9 @@ Unmixer::Explanation Unmixer::explain(const Glow& glow, Choice choice, int data)
   out.choice = choice;
   const EmitterTable& table = meter_->table();
   const int freedom = data - unknowns_in(choice);
-  if (choice == kSoot) {
+  if (choice == kWithSoot) {
     out.reading = meter_->read(glow);
-  } else if ((choice & kSoot) != 0) {
+  } else if ((choice & kWithSoot) != 0) {
     out.reading = most_likely(kColdestBesideLines, kHottestBesideLines, freedom,
                               [&](double kelvin) { return chi_square(glow, kelvin, choice); });
   }
@@ -165,14 +165,14 @@ Unmixed Unmixer::read(const Glow& glow) const {
     return e.choice != best.choice && emitters_in(e.choice) == emitters_in(best.choice) &&
            e.score() < best.score() + kSeen;
   });
-  out.kind = !fits                        ? Unmixed::Kind::neither
-             : rivalled                   ? Unmixed::Kind::alike
-             : best.choice == kSoot       ? Unmixed::Kind::soot
-             : (best.choice & kSoot) != 0 ? Unmixed::Kind::mixed
-                                          : Unmixed::Kind::lines;
+  out.kind = !fits                            ? Unmixed::Kind::neither
+             : rivalled                       ? Unmixed::Kind::alike
+             : best.choice == kWithSoot       ? Unmixed::Kind::soot
+             : (best.choice & kWithSoot) != 0 ? Unmixed::Kind::mixed
+                                              : Unmixed::Kind::lines;
   if ((out.kind == Unmixed::Kind::soot || out.kind == Unmixed::Kind::mixed) && best.reading.kelvin > 0)
     for (const Explanation& e : all)
-      if (e.choice != kSoot && (e.choice & best.choice) == best.choice && e.reading.kelvin > 0)
+      if (e.choice != kWithSoot && (e.choice & best.choice) == best.choice && e.reading.kelvin > 0)
         out.reading.sigma = std::max(out.reading.sigma, reach(glow, e, best.reading.kelvin) / 2);
   if (out.kind != Unmixed::Kind::mixed && out.kind != Unmixed::Kind::lines) return out;
   const EmitterLevels levels = meter_->table().at(Kelvin(std::max(1.0, best.reading.kelvin)));

@@ -5,7 +5,7 @@
 
 namespace emberlock {
 
-/// "0.1.0" at that release's tag, "0.1.0+12.g1a2b3c4d5e" twelve commits later.
+/// "0.2.0" at that release's tag, "0.2.0+12.g1a2b3c4d5e" twelve commits later.
 std::string version();
 
 }  // namespace emberlock

@@ -62,9 +62,7 @@ SequenceFrame frame_of(const Json& json) {
   f.light = json.at("light").get<double>();
   if (const Json& flicker = json.at("flicker"); !flicker.is_null())
     f.flicker = recon::Flicker{flicker.at("pictures").get<double>(), flicker.at("renders").get<double>()};
-  // Earlier versions didn't tell.
-  if (const Json time = json.value("time_s", Json(nullptr)); !time.is_null())
-    f.time = Seconds(time.get<double>());
+  if (const Json& time = json.at("time_s"); !time.is_null()) f.time = Seconds(time.get<double>());
   return f;
 }
 

@@ -66,7 +66,7 @@ class SegmentWriter {
 };
 
 /// The index records of a segment's frames in file order, as far as the file can be read. Pixels are not
-/// checked. Empty for old segments without records, and for other files.
+/// checked. Empty for segments without records, and for other files.
 std::vector<IndexRecord> records_in(const std::filesystem::path& segment);
 
 /// Decodes frames of one segment file by their time stamps.

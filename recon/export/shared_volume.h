@@ -27,7 +27,7 @@ struct SharedGrid {
 
 /// Where a volume comes from. What isn't known is empty.
 struct Provenance {
-  std::string program;  ///< "Emberlock 0.1.0"
+  std::string program;  ///< "Emberlock 0.2.0"
   std::string input;    ///< what was reconstructed
   std::string up;       ///< the world's axis that points up: "z", "-y"
   std::optional<std::uint64_t> frame;

@@ -12,7 +12,6 @@
 #include "drivers/replay/record.h"
 #include "drivers/replay/replay.h"
 #include "rig/align/decision_proto.h"
-#include "rig/align/old_record.h"
 #include "rig/align/settings_proto.h"
 
 namespace emberlock::rig {
@@ -38,12 +37,19 @@ class RecordedAnswers final : public Clock {
   mutable std::size_t next_ = 0;
 };
 
+/// Whether a note holds an alignment's settings as JSON, as versions before 0.2.0 recorded them.
+bool holds_settings(const std::string& note) {
+  if (!check_json_nesting(note, "note").ok()) return false;
+  const auto json = nlohmann::json::parse(note, nullptr, false);
+  return json.is_object() && json.contains("align");
+}
+
 Result<AlignRunOptions> recorded_options(const session::SessionReader& session) {
   for (const v1::Event& event : session.events()) {
     if (event.has_settings()) return align_options(event.settings());
-    if (!event.has_note()) continue;
-    EMBERLOCK_ASSIGN_OR_RETURN(std::optional<AlignRunOptions> options, options_in_note(event.note()));
-    if (options) return std::move(*options);
+    if (event.has_note() && holds_settings(event.note()))
+      return Error{ErrorKind::bad_input, "a version before 0.2.0 recorded this alignment",
+                   session.folder().string(), "replay it with the version that recorded it"};
   }
   return Error{ErrorKind::bad_input, "holds no alignment's settings", session.folder().string(),
                "replay a recording that `emberlock align --record` made"};
@@ -51,7 +57,6 @@ Result<AlignRunOptions> recorded_options(const session::SessionReader& session) 
 
 /// Whether a round reads and decides what was recorded, in codes and numbers, bit for bit.
 bool same_as_recorded(const v1::DecisionEvent& recorded, const AlignRoundReport& report) {
-  if (!recorded.json().empty()) return same_round(recorded.json(), report);
   return recorded.SerializeAsString() == to_proto(report).SerializeAsString();
 }
 

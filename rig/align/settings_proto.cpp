@@ -206,7 +206,7 @@ Result<AlignRunOptions> align_options(const AlignmentSettings& settings) {
   options.seed = settings.seed();
   if (settings.has_hold_s()) intake.take("hold_s", settings.hold_s(), options.hold.emplace(), 0);
   for (const AlignmentSettings::Camera& camera : settings.cameras()) take_camera(camera, options, intake);
-  // Older recordings, and those of one common instant, have none.
+  // Recordings of one common instant have none.
   if (std::all_of(options.offsets.begin(), options.offsets.end(),
                   [](Seconds offset) { return offset == Seconds(0); }))
     options.offsets.clear();

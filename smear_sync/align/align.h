@@ -142,7 +142,7 @@ struct AlignOptions {
   std::optional<StrobeDial> dial = {};
   /// Cameras are called aligned once they surely stay so for this long, as far as it can be had: drifts are
   /// measured before, and cameras are reset that would leave before although a reset lets them stay. While
-  /// they are held that is renewed before less is left. Zero, as in older recordings: whenever all are within
+  /// they are held that is renewed before less is left. Zero: whenever all are within
   /// tolerance.
   Seconds shortest_take{0};
 };

@@ -159,7 +159,7 @@ bool trim_rates(AlignState& state, AlignDecision& decision, const AlignRound& ro
   const Timing timing{round.at, state.last_round ? round.at - *state.last_round : options.round_time};
   const TrackOptions track = track_options(options);
   if (!state.target || !state.target->settled) {
-    // Rounded as by those who made the first recordings, which replay to the last digit.
+    // The rounding is that of recordings, which replay to the last digit.
     const Seconds delayed = wrap_positive(*decision.target + round.strobe_phase, options.period);
     const Seconds middle = wrap_positive(delayed - round.strobe_phase, options.period);
     if (!state.trimming) state.trimming = round.at;

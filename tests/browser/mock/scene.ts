@@ -47,7 +47,7 @@ export function history(rounds: number): RoundPoint[] {
 }
 
 const base: Wire<DaemonStatus> = {
-  rig: 'virtual:11', version: '0.1.0', faults: [],
+  rig: 'virtual:11', version: '0.2.0', faults: [],
   storage: {folder: '/var/lib/emberlock', free_bytes: 412e9, floor_bytes: 5e9, bytes_per_s: 243e6, minutes_left: 27.9},
   strobe: {id: 'virtual', light: 'GREEN', reason: '', settings: {output: 'OFF', rate_hz: 24, phase_s: 0, width_s: 20e-6, code: []}, by_hand: false, measured_hz: 0},
 };

@@ -1,20 +1,23 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
 #include <cmath>
+#include <cstdlib>
 #include <filesystem>
+#include <fstream>
 #include <functional>
 #include <string>
 #include <vector>
 
 #include <gmock/gmock.h>
+#include <google/protobuf/util/delimited_message_util.h>
 #include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
 
 #include "rig/align/json.h"
 #include "rig/align/record.h"
 #include "rig/align/stagger.h"
 #include "session/reader.h"
 #include "tests/support/dial_bench.h"
-#include "tests/support/old_alignment.h"
 #include "tests/support/small_rig.h"
 
 namespace emberlock::cli {
@@ -24,6 +27,30 @@ namespace fs = std::filesystem;
 using test::small_rig;
 using test::SmallBench;
 using testing::HasSubstr;
+
+std::vector<v1::Event> events_of(const fs::path& folder) {
+  const auto session = session::SessionReader::open(folder);
+  EXPECT_TRUE(session.ok());
+  return session.ok() ? session->events() : std::vector<v1::Event>();
+}
+
+void write_events(const fs::path& folder, const std::vector<v1::Event>& events) {
+  std::ofstream out(folder / "events.binpb", std::ios::binary | std::ios::trunc);
+  for (const v1::Event& event : events)
+    ASSERT_TRUE(google::protobuf::util::SerializeDelimitedToOstream(event, &out));
+}
+
+/// A rig whose recordings are small: two cameras with few columns and next to no noise.
+drivers::VirtualRigOptions quiet_rig() {
+  drivers::VirtualRigOptions rig = small_rig(4, 2);
+  for (drivers::VirtualCameraOptions& camera : rig.cameras) {
+    camera.layout.size.width = 32;
+    camera.lamp.x = 16;
+  }
+  rig.scene.read_noise = 0.1;
+  rig.scene.electrons_per_level = 1e6;
+  return rig;
+}
 
 class AlignReplay : public testing::Test {
  protected:
@@ -49,21 +76,6 @@ class AlignReplay : public testing::Test {
     };
   }
 
-  /// Records a run. Returns its rounds, as `emberlock align --json` prints them.
-  std::vector<nlohmann::ordered_json> record(SmallBench& bench) const {
-    std::vector<nlohmann::ordered_json> rounds;
-    const auto recorded = rig::record_align(
-        folder_, bench.align, bench.options,
-        [&](const rig::AlignRoundReport& report) { rounds.push_back(rig::round_json(report)); });
-    EXPECT_TRUE(recorded.ok());
-    EXPECT_FALSE(rounds.empty());
-    return rounds;
-  }
-  static std::vector<std::string> lines_of(const std::vector<nlohmann::ordered_json>& rounds) {
-    std::vector<std::string> lines;
-    for (const nlohmann::ordered_json& round : rounds) lines.push_back(round.dump());
-    return lines;
-  }
   /// Records a run, and replays it. Returns the recorded one.
   rig::AlignRunResult expect_the_same_again(SmallBench& bench) const {
     std::vector<std::string> live;
@@ -87,6 +99,12 @@ class AlignReplay : public testing::Test {
     const auto replayed = rig::replay_align(folder_);
     ASSERT_FALSE(replayed.ok());
     EXPECT_THAT(replayed.error().message(), HasSubstr("round 1"));
+  }
+
+  /// Keeps the recording for later versions (tests/files/session_VERSION/README.md).
+  void keep_as(const char* name) const {
+    const char* kept = std::getenv("EMBERLOCK_KEEP_RECORDINGS");  // NOLINT(concurrency-mt-unsafe)
+    if (kept != nullptr) fs::copy(folder_, fs::path(kept) / name, fs::copy_options::recursive);
   }
 
   fs::path folder_;
@@ -127,62 +145,64 @@ TEST_F(AlignReplay, GivesTheSameStaggeredRunToTheBit) {
   EXPECT_EQ(expect_the_same_again(bench).last.verdict, smear::AlignVerdict::aligned);
 }
 
-TEST_F(AlignReplay, RecordingsWhoseSettingsAndDecisionsAreJsonReplayWhateverTheirSentences) {
-  SmallBench bench(small_rig(4));
+TEST_F(AlignReplay, ATimedRunOfASmallRigIsTheSameAgain) {
+  SmallBench bench(quiet_rig());
   bench.options.align.policy = smear::AlignPolicy::timed;
-  bench.options.align.limits = smear::AlignLimits{};
-  std::vector<nlohmann::ordered_json> rounds = record(bench);
-  const std::vector<std::string> live = lines_of(rounds);
-  for (nlohmann::ordered_json& round : rounds) {
-    round["reason"] = "as it was worded once";
-    for (nlohmann::ordered_json& camera : round["cameras"]) camera["reason"] = "another sentence";
+  EXPECT_GT(expect_the_same_again(bench).resets, 0);
+  keep_as("timed");
+}
+
+TEST_F(AlignReplay, ATrimmedRunOfASmallRigIsTheSameAgain) {
+  drivers::VirtualRigOptions setup = quiet_rig();
+  for (drivers::VirtualCameraOptions& camera : setup.cameras) {
+    camera.trim = FrameRateTrim{PartsPerMillion(500), PartsPerMillion(0.5), milliseconds(80)};
+    camera.reset_jitter = milliseconds(1.5);
   }
-  test::write_as_before(folder_, test::old_settings(bench.options), lines_of(rounds));
+  SmallBench bench(setup);
+  bench.options.align.policy = smear::AlignPolicy::trimmed;
+  bench.options.align.tolerance.amount = Rows(3);
+  bench.options.align.trim_time = Seconds(5);
+  EXPECT_EQ(expect_the_same_again(bench).last.verdict, smear::AlignVerdict::aligned);
+  keep_as("trimmed");
+}
+
+TEST_F(AlignReplay, ARunWithADialIsTheSameAgain) {
+  test::DialBench bench(quiet_rig());
+  int rounds = 0;
+  std::vector<std::string> live;
+  const auto note = into(live);
+  const auto obey = [&](const rig::AlignRoundReport& report) {
+    ++rounds;
+    note(report);
+    ASSERT_TRUE(report.decision.dial);
+    bench.obey(*report.decision.dial);
+  };
+  ASSERT_TRUE(
+      rig::record_align(folder_, bench.align, bench.options, obey, {}, [&] { return rounds >= 4; }).ok());
+  EXPECT_GT(bench.turns, 0);
   std::vector<std::string> again;
-  const auto replayed = rig::replay_align(
-      folder_, [&](const rig::AlignRoundReport& report) { again.push_back(rig::round_json(report).dump()); });
+  const auto replayed = rig::replay_align(folder_, into(again));
   ASSERT_TRUE(replayed.ok()) << replayed.error().message();
   EXPECT_EQ(live, again);
-
-  rounds.front()["beat_ppm"] = rounds.front()["beat_ppm"].get<double>() + 1e-9;
-  test::write_as_before(folder_, {}, lines_of(rounds));
-  expect_differs_in_round_1();
+  keep_as("dial");
 }
 
-TEST_F(AlignReplay, RecordingsWhoseDialHasAdviceInWordsReplay) {
-  test::DialBench bench(small_rig(4, 2));
-  int rounds_left = 3;
-  std::vector<std::string> lines;
-  ASSERT_TRUE(rig::record_align(
-                  folder_, bench.align, bench.options,
-                  [&](const rig::AlignRoundReport& report) {
-                    nlohmann::ordered_json round = rig::round_json(report);
-                    EXPECT_FALSE(round["dial"]["words"].get<std::string>().empty());
-                    round["dial"]["words"] = "turn it somewhere";
-                    lines.push_back(round.dump());
-                    --rounds_left;
-                  },
-                  {}, [&] { return rounds_left <= 0; })
-                  .ok());
-  EXPECT_TRUE(rig::replay_align(folder_).ok());
-  test::write_as_before(folder_, test::old_settings(bench.options), lines);
-  const auto replayed = rig::replay_align(folder_);
-  EXPECT_TRUE(replayed.ok()) << replayed.error().message();
+TEST_F(AlignReplay, RecordingsOfEarlierVersionsReplay) {
+  const auto replayed = rig::replay_align(EMBERLOCK_SOURCE_DIR "/tests/files/session_0.2.0/alignment/timed");
+  ASSERT_TRUE(replayed.ok()) << replayed.error().message();
+  EXPECT_EQ(replayed->last.verdict, smear::AlignVerdict::aligned);
 }
 
-// From before the strobe was moved and before runs were held: the settings have neither.
-TEST_F(AlignReplay, TheFirstRecordingsReplay) {
-  SmallBench bench(small_rig(4));
-  bench.options.align.strobe_step = Seconds(0);
-  std::vector<std::string> live;
-  for (nlohmann::ordered_json round : record(bench)) {
-    round.erase("sensor");
-    for (nlohmann::ordered_json& camera : round["cameras"]) camera.erase("servo");
-    live.push_back(round.dump());
+TEST_F(AlignReplay, NotesInFrontOfTheSettingsChangeNothing) {
+  SmallBench bench(quiet_rig());
+  ASSERT_TRUE(rig::record_align(folder_, bench.align, bench.options).ok());
+  std::vector<v1::Event> events = events_of(folder_);
+  for (const char* text : {"late frame: 3 0.5 a", "{\"aligned\": 1}", "[\"align\"]"}) {
+    v1::Event note;
+    note.set_note(text);
+    events.insert(events.begin(), note);
   }
-  nlohmann::ordered_json settings = test::old_settings(bench.options);
-  for (const char* key : {"strobe_step_s", "hold_s", "reset_by"}) settings.erase(key);
-  test::write_as_before(folder_, settings, live);
+  write_events(folder_, events);
   const auto replayed = rig::replay_align(folder_);
   EXPECT_TRUE(replayed.ok()) << replayed.error().message();
 }
@@ -201,15 +221,14 @@ TEST_F(AlignReplay, EveryFrameOfTheRunIsInTheRecording) {
 TEST_F(AlignReplay, ADecisionThatDiffersFromTheRecordedOneIsAnError) {
   SmallBench bench(small_rig(4));
   ASSERT_TRUE(rig::record_align(folder_, bench.align, bench.options).ok());
-  const std::vector<v1::Event> events = test::events_of(folder_);
+  const std::vector<v1::Event> events = events_of(folder_);
   const auto edit_first = [&](const std::function<void(v1::DecisionEvent&)>& edit) {
     std::vector<v1::Event> edited = events;
     const auto first = std::find_if(edited.begin(), edited.end(),
                                     [](const v1::Event& event) { return event.has_decision(); });
     ASSERT_NE(first, edited.end());
-    EXPECT_TRUE(first->decision().json().empty());
     edit(*first->mutable_decision());
-    test::write_events(folder_, edited);
+    write_events(folder_, edited);
   };
   edit_first([](v1::DecisionEvent& decision) {
     decision.set_period_offset_ppm(std::nextafter(decision.period_offset_ppm(), 1e9));

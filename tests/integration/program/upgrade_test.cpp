@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A session that version 0.1.0 imported becomes a volume.
+// The program takes what version 0.2.0 imported and recorded.
 #include <filesystem>
 #include <string>
 
@@ -12,14 +12,25 @@
 namespace emberlock {
 namespace {
 
-TEST(UpgradeProgram, ASessionOfTheFirstVersionIsReconstructed) {
+using testing::HasSubstr;
+
+Shell emberlock_with(const std::string& words) { return shell(std::string(EMBERLOCK_PROGRAM) + " " + words); }
+
+TEST(UpgradeProgram, ASessionOfAnEarlierVersionIsReconstructed) {
   const test::TempFolder temp;
-  const Shell done = shell(std::string(EMBERLOCK_PROGRAM) +
-                           " reconstruct " EMBERLOCK_SOURCE_DIR
-                           "/tests/files/session_0.1.0/calibrated --frame 1 --voxels 16 --device cpu --out " +
-                           (temp / "result").string());
+  const Shell done =
+      emberlock_with("reconstruct " EMBERLOCK_SOURCE_DIR
+                     "/tests/files/session_0.2.0/calibrated --frame 1 --voxels 16 --device cpu --out " +
+                     (temp / "result").string());
   EXPECT_EQ(done.status, 0) << done.output;
   EXPECT_TRUE(std::filesystem::exists(temp / "result/volume.vdb"));
+}
+
+TEST(UpgradeProgram, AnAlignmentOfAnEarlierVersionIsReplayed) {
+  const Shell done =
+      emberlock_with("align --replay " EMBERLOCK_SOURCE_DIR "/tests/files/session_0.2.0/alignment/timed");
+  EXPECT_EQ(done.status, 0) << done.output;
+  EXPECT_THAT(done.output, HasSubstr("aligned"));
 }
 
 }  // namespace

@@ -60,7 +60,7 @@ std::string part(const fs::path& path, int index) {
 }
 
 std::string folder_of(const std::string& header) {
-  const std::string first = folder_of(header);
+  const std::string first = part(header, 0);
   return first == "emberlock" ? "proto" : first;  // generated from proto/emberlock/v1
 }
 

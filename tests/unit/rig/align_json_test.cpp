@@ -4,10 +4,7 @@
 
 #include "base/file.h"
 #include "rig/align/json.h"
-#include "rig/align/old_record.h"
 #include "rig/align/record.h"
-#include "rig/align/settings_proto.h"
-#include "tests/support/old_alignment.h"
 #include "tests/support/small_rig.h"
 #include "tests/support/temp_folder.h"
 
@@ -15,83 +12,6 @@ namespace emberlock::rig {
 namespace {
 
 using testing::HasSubstr;
-
-AlignRunOptions some_options() {
-  AlignRunOptions options;
-  options.align.policy = smear::AlignPolicy::timed;
-  options.align.tolerance.amount = milliseconds(1.1);
-  options.align.max_rounds = 7;
-  options.align.limits = smear::AlignLimits{60, Seconds(600), 0.95};
-  options.seed = 18446744073709551615u;
-  options.timing = {{.rows = 480, .shifts = 500, .direction = smear::ReadDirection::bottom_first}, {}};
-  options.delays = {std::nullopt, smear::ResetDelay{milliseconds(12.3), milliseconds(0.1)}};
-  return options;
-}
-
-/// Settings as a note of an old recording had them, read.
-Result<AlignRunOptions> from_old(const nlohmann::ordered_json& settings) {
-  const auto options = options_in_note(nlohmann::ordered_json{{"align", settings}}.dump());
-  if (!options.ok()) return options.error();
-  EXPECT_TRUE(*options);
-  return (*options).value_or(AlignRunOptions{});
-}
-
-TEST(OldAlignSettings, ComeBackAsTheyWere) {
-  const auto back = from_old(test::old_settings(some_options()));
-  ASSERT_TRUE(back.ok()) << back.error().message();
-  EXPECT_EQ(to_proto(*back).SerializeAsString(), to_proto(some_options()).SerializeAsString());
-  EXPECT_EQ(back->timing[0].direction, smear::ReadDirection::bottom_first);
-  EXPECT_EQ(back->delays[1]->mean, milliseconds(12.3));
-  EXPECT_EQ(back->seed, 18446744073709551615u);
-  EXPECT_EQ(back->align.limits->resets, 60);
-}
-
-TEST(OldAlignSettings, TheDialOfAStrobeThatIsSetByHandComesBack) {
-  AlignRunOptions options = some_options();
-  options.align.dial = StrobeDial{.step = Hertz(1.0 / 60)};
-  auto settings = test::old_settings(options);
-  const auto back = from_old(settings);
-  ASSERT_TRUE(back.ok()) << back.error().message();
-  EXPECT_EQ(back->align.dial, options.align.dial);
-  settings["dial"]["step_hz"] = 0;
-  EXPECT_FALSE(from_old(settings).ok());
-}
-
-TEST(OldAlignSettings, EveryMissingOrMistypedFieldIsAnErrorNotACrash) {
-  const auto whole = test::old_settings(some_options());
-  for (const auto& [key, value] : whole.items()) {
-    auto missing = whole;
-    missing.erase(key);
-    // Than the first recordings.
-    const bool newer = key == "strobe_step_s" || key == "hold_s" || key == "reset_by";
-    EXPECT_EQ(from_old(missing).ok(), newer) << key;
-    auto mistyped = whole;
-    mistyped[key] = nlohmann::json::object();
-    EXPECT_FALSE(from_old(mistyped).ok()) << key;
-  }
-  EXPECT_FALSE(from_old(nullptr).ok());
-}
-
-TEST(OldAlignSettings, OtherNotesHoldNone) {
-  for (const char* note : {"", "late frame: 3 0.5 a", "{\"aligned\": 1}", "[\"align\"]"}) {
-    const auto options = options_in_note(note);
-    ASSERT_TRUE(options.ok()) << note;
-    EXPECT_FALSE(*options) << note;
-  }
-  EXPECT_FALSE(*options_in_note(std::string(100'000, '[')));
-}
-
-TEST(OldAlignSettings, ThoseFromBeforeTheStrobeWasMovedAndRunsWereHeldAreRead) {
-  auto first = test::old_settings(some_options());
-  first.erase("strobe_step_s");
-  first.erase("hold_s");
-  const auto unmoved = from_old(first);
-  ASSERT_TRUE(unmoved.ok()) << unmoved.error().message();
-  EXPECT_EQ(unmoved->align.strobe_step, Seconds(0));
-  EXPECT_FALSE(unmoved->hold);
-  first["nod_s"] = 0.001;  // as the step was called at first
-  EXPECT_EQ(from_old(first)->align.strobe_step, milliseconds(1));
-}
 
 TEST(AlignJson, WhatIsNotKnownIsNull) {
   smear::AlignRound round;

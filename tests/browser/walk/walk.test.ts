@@ -118,7 +118,7 @@ test('aligning: who is being reset is the same everywhere', async () => {
   const {step, marked} = await until(() => page.evaluate(() => ({
     step: document.querySelector('.next .next-step')!.textContent!,
     marked: [...document.querySelectorAll<HTMLElement>('.tile:has(.next-mark:not([hidden]))')].map(tile => [tile.dataset.camera!, tile.querySelector('.word')!.textContent!]),
-  })), now => now.marked.length > 0, 'one is to be reset', 60);
+  })), now => now.marked.length > 0, 'one is to be reset');
   expect(step).toBe(`${marked.map(([id]) => id).join(', ')} ${marked.length > 1 ? 'are' : 'is'} being reset by command.`);
   expect(marked.map(([, word]) => word)).not.toContain('in tolerance');
   await screenshot(page, 'aligning');
@@ -150,7 +150,7 @@ test('locked: every camera green, its offset in rows and microseconds, its dot i
     const spans = [...tile.querySelectorAll<SVGRectElement>('.band')].map(({y, height}) => [y.baseVal.value, y.baseVal.value + height.baseVal.value] as const);
     return [...tile.querySelectorAll<SVGPathElement>('.dots path')].map(dot => dot.getBBox().y + dot.getBBox().height / 2)
       .map(dot => ({camera: (tile as HTMLElement).dataset.camera, dot, spans, inside: spans.some(([first, last]) => dot >= first - 2 && dot <= last + 2)}));
-  })), shown => shown.length > kCameras / 2, 'most cameras show their dot', 60);
+  })), shown => shown.length > kCameras / 2, 'most cameras show their dot');
   expect(dots.filter(({inside}) => !inside)).toEqual([]);
   await agrees('the sums of the alignment', async () => {
     const shown = await facts(page.locator('#alignment .numbers'));

@@ -12,11 +12,21 @@
 
 namespace emberlock {
 
-/// What this machine can run: tests that hold on every device are instantiated over these.
-inline std::vector<recon::Device> devices() {
+/// What this machine can run.
+inline std::vector<recon::Device> every_device() {
   std::vector<recon::Device> found = {recon::Device::cpu};
   if (recon::cuda_status().ok()) found.push_back(recon::Device::cuda);
   return found;
+}
+
+/// Tests that hold on every device are instantiated over these. Under sanitizers a GPU in software is too
+/// slow for most of them: only suites that run each of its passes once take every_device() there.
+inline std::vector<recon::Device> devices() {
+#ifdef EMBERLOCK_SANITIZED
+  return {recon::Device::cpu};
+#else
+  return every_device();
+#endif
 }
 
 inline std::string device_name(recon::Device device) {
@@ -30,19 +40,22 @@ class OnEachDevice : public testing::TestWithParam<recon::Device> {
   ~OnEachDevice() override { ::unsetenv("EMBERLOCK_DEVICE"); }
 };
 
-/// What this machine can run beside the CPU, to be compared with it; often none.
-inline std::vector<recon::Device> other_devices() {
-  const std::vector<recon::Device> all = devices();
+/// The devices besides the CPU, to be compared with it; often none.
+inline std::vector<recon::Device> others_of(const std::vector<recon::Device>& all) {
   return {all.begin() + 1, all.end()};
 }
+inline std::vector<recon::Device> other_devices() { return others_of(every_device()); }
 
 /// The one that such a test runs on.
 inline recon::Device device_here() { return OnEachDevice::GetParam(); }
 
 /// Suite `name` for TEST_P.
-#define ON_EACH_DEVICE(name)                                            \
-  class name : public OnEachDevice {};                                  \
-  INSTANTIATE_TEST_SUITE_P(Devices, name, testing::ValuesIn(devices()), \
+#define ON_EACH_DEVICE(name) EMBERLOCK_SUITE_ON(name, devices())
+/// Under sanitizers too.
+#define ON_EACH_DEVICE_SANITIZED_TOO(name) EMBERLOCK_SUITE_ON(name, every_device())
+#define EMBERLOCK_SUITE_ON(name, on_devices)                             \
+  class name : public OnEachDevice {};                                   \
+  INSTANTIATE_TEST_SUITE_P(Devices, name, testing::ValuesIn(on_devices), \
                            [](const auto& on) { return device_name(on.param); })
 
 }  // namespace emberlock

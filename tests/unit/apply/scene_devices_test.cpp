@@ -33,7 +33,7 @@ Mesh furnished() {
   return mesh;
 }
 
-ON_EACH_DEVICE(SceneDevices);
+ON_EACH_DEVICE_SANITIZED_TOO(SceneDevices);
 
 /// Five flames, of which one scatters, in light from outside.
 class Furnished {

@@ -31,7 +31,7 @@ std::shared_ptr<v1::IterationPreview> iteration_of(const std::string& reconstruc
   return preview;
 }
 
-TEST(Board, TheStatusShownLastIsTheOneThatIsRead) {
+TEST(BoardThreads, TheStatusShownLastIsTheOneThatIsRead) {
   test::FakeApi api;
   v1::DaemonStatus status;
   status.set_phase(v1::LOCKED);
@@ -42,7 +42,7 @@ TEST(Board, TheStatusShownLastIsTheOneThatIsRead) {
   EXPECT_EQ(api.board().status()->revision(), 2U);
 }
 
-TEST(Board, WhatPeopleReadAreSentences) {
+TEST(BoardThreads, WhatPeopleReadAreSentences) {
   Board board;
   v1::DaemonStatus status;
   status.set_reason("every camera lies within tolerance of the target");
@@ -67,7 +67,7 @@ TEST(Board, WhatPeopleReadAreSentences) {
   EXPECT_EQ(board.notices(0).front().text(), "raw: compressed, as it was asked.") << "a name stays";
 }
 
-TEST(Board, OfTheJournalTheLastThousandAreKept) {
+TEST(BoardThreads, OfTheJournalTheLastThousandAreKept) {
   Board board;
   for (std::size_t i = 0; i < Board::kNotices + 5; ++i) board.notice(v1::GREEN, "line");
   ASSERT_THAT(board.notices(0), SizeIs(Board::kNotices));
@@ -75,7 +75,7 @@ TEST(Board, OfTheJournalTheLastThousandAreKept) {
   EXPECT_THAT(board.notices(Board::kNotices + 4), SizeIs(1));
 }
 
-TEST(Board, AWatcherThatComesLaterSeesNoPictureFromBefore) {
+TEST(BoardThreads, AWatcherThatComesLaterSeesNoPictureFromBefore) {
   Board board;
   {
     const Subscription watching = board.want_pictures();
@@ -88,7 +88,7 @@ TEST(Board, AWatcherThatComesLaterSeesNoPictureFromBefore) {
   EXPECT_THAT(board.pictures(), IsEmpty());
 }
 
-TEST(Board, OnlyTheNewestIterationHasPicturesAndAnotherReconstructionBeginsAnew) {
+TEST(BoardThreads, OnlyTheNewestIterationHasPicturesAndAnotherReconstructionBeginsAnew) {
   Board board;
   board.show(iteration_of("one", 1));
   board.show(iteration_of("one", 2));
@@ -105,7 +105,7 @@ TEST(Board, OnlyTheNewestIterationHasPicturesAndAnotherReconstructionBeginsAnew)
   EXPECT_THAT(board.iterations(0), SizeIs(1)) << "of the frame at hand";
 }
 
-TEST(Board, IterationsWithoutPicturesLeaveTheNewestPicturesStanding) {
+TEST(BoardThreads, IterationsWithoutPicturesLeaveTheNewestPicturesStanding) {
   Board board;
   board.show(iteration_of("one", 1));
   auto numbers = std::make_shared<v1::IterationPreview>(*iteration_of("one", 2));
@@ -116,7 +116,7 @@ TEST(Board, IterationsWithoutPicturesLeaveTheNewestPicturesStanding) {
   EXPECT_EQ(board.iterations(0).front()->captured_jpeg(), "captured");
 }
 
-TEST(Board, NobodyIsToldAfterItsSubscriptionEnded) {
+TEST(BoardThreads, NobodyIsToldAfterItsSubscriptionEnded) {
   Board board;
   std::vector<Board::Topic> told;
   std::optional<Subscription> subscription =

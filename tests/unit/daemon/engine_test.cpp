@@ -28,7 +28,7 @@ using ::testing::HasSubstr;
 
 const ImageLayout kLeftLayout{{64, 48}, PixelFormat::gray8, 8};
 
-class EngineThread : public ::testing::Test {
+class EngineThreads : public ::testing::Test {
  protected:
   void start() { engine_ = Engine::start(config_, board_).value(); }
   [[nodiscard]] v1::Phase phase() const { return board_.status()->phase(); }
@@ -51,7 +51,7 @@ class EngineThread : public ::testing::Test {
   std::unique_ptr<Engine> engine_;
 };
 
-TEST_F(EngineThread, WhoeverHasAnAnswerFindsInTheStatusWhatItDid) {
+TEST_F(EngineThreads, WhoeverHasAnAnswerFindsInTheStatusWhatItDid) {
   start();
   ASSERT_TRUE(engine_->align({}).ok());
   EXPECT_NE(phase(), v1::IDLE);
@@ -67,7 +67,7 @@ TEST_F(EngineThread, WhoeverHasAnAnswerFindsInTheStatusWhatItDid) {
   EXPECT_EQ(phase(), v1::IDLE);
 }
 
-TEST_F(EngineThread, WhatManyAskAtOnceIsDoneAndTheRecordingIsWhole) {
+TEST_F(EngineThreads, WhatManyAskAtOnceIsDoneAndTheRecordingIsWhole) {
   start();
   ASSERT_TRUE(engine_->record(take()).ok());
   std::vector<std::thread> clients;
@@ -86,7 +86,7 @@ TEST_F(EngineThread, WhatManyAskAtOnceIsDoneAndTheRecordingIsWhole) {
   EXPECT_TRUE(session::verify_session(sessions() / "take")->whole());
 }
 
-TEST_F(EngineThread, AJobTellsWhatCameOfIt) {
+TEST_F(EngineThreads, AJobTellsWhatCameOfIt) {
   left_by_another("old", session::Encoding::ffv1);
   start();
   v1::SessionRequest request;
@@ -100,7 +100,7 @@ TEST_F(EngineThread, AJobTellsWhatCameOfIt) {
   EXPECT_EQ((*job)->state().state(), v1::Job::DONE);
 }
 
-TEST_F(EngineThread, EndedInMidRecordingItFinishesIt) {
+TEST_F(EngineThreads, EndedInMidRecordingItFinishesIt) {
   start();
   ASSERT_TRUE(engine_->record(take()).ok());
   engine_.reset();
@@ -110,7 +110,7 @@ TEST_F(EngineThread, EndedInMidRecordingItFinishesIt) {
   EXPECT_TRUE(check->whole()) << check->to_do;
 }
 
-TEST_F(EngineThread, WhatAnEarlierDaemonLeftUncompressedIsCompressedFromTheStart) {
+TEST_F(EngineThreads, WhatAnEarlierDaemonLeftUncompressedIsCompressedFromTheStart) {
   left_by_another("raw", session::Encoding::raw_nut);
   left_by_another("compressed", session::Encoding::ffv1);
   config_.recording.transcode = rig::RecordingConfig::Transcode::when_idle;
@@ -122,7 +122,7 @@ TEST_F(EngineThread, WhatAnEarlierDaemonLeftUncompressedIsCompressedFromTheStart
   EXPECT_EQ(board_.notices(0).size(), 1U);
 }
 
-TEST_F(EngineThread, WhatItRecordedUncompressedIsCompressedAndSaid) {
+TEST_F(EngineThreads, WhatItRecordedUncompressedIsCompressedAndSaid) {
   config_.recording.writer.encoding = session::Encoding::raw_nut;
   config_.recording.transcode = rig::RecordingConfig::Transcode::when_idle;
   start();
@@ -137,7 +137,7 @@ TEST_F(EngineThread, WhatItRecordedUncompressedIsCompressedAndSaid) {
   EXPECT_FALSE(is_uncompressed(sessions() / "take"));
 }
 
-TEST_F(EngineThread, ASessionInSalvageIsShownAndRefusedForAllElseWhileARecordingMayBegin) {
+TEST_F(EngineThreads, ASessionInSalvageIsShownAndRefusedForAllElseWhileARecordingMayBegin) {
   {
     auto writer = session::SessionWriter::create(sessions() / "killed", test::manifest_of({kLeftLayout}),
                                                  test::small_disk_options());
@@ -184,7 +184,7 @@ TEST_F(EngineThread, ASessionInSalvageIsShownAndRefusedForAllElseWhileARecording
   EXPECT_TRUE((*verification)->wait(test::kHangLimit)->ok());
 }
 
-TEST_F(EngineThread, EndedItRefusesWhatIsAskedAndStillFinishesItsRecording) {
+TEST_F(EngineThreads, EndedItRefusesWhatIsAskedAndStillFinishesItsRecording) {
   start();
   ASSERT_TRUE(engine_->record(take()).ok());
   engine_->end();
@@ -195,7 +195,7 @@ TEST_F(EngineThread, EndedItRefusesWhatIsAskedAndStillFinishesItsRecording) {
   EXPECT_TRUE(session::verify_session(sessions() / "take")->whole());
 }
 
-TEST_F(EngineThread, WhereNothingIsToBeCompressedItStaysAsItWas) {
+TEST_F(EngineThreads, WhereNothingIsToBeCompressedItStaysAsItWas) {
   left_by_another("raw", session::Encoding::raw_nut);
   config_.recording.transcode = rig::RecordingConfig::Transcode::never;
   start();

@@ -69,7 +69,7 @@ class Asking {
   std::string told;  ///< once the jobs are drained
 };
 
-TEST(JobsTest, AreListedInTheOrderInWhichTheyWereAdded) {
+TEST(JobsThreads, AreListedInTheOrderInWhichTheyWereAdded) {
   Asking asking;
   Jobs jobs;
   ASSERT_TRUE(jobs.add(asking.job("a")).ok());
@@ -87,7 +87,7 @@ TEST(JobsTest, AreListedInTheOrderInWhichTheyWereAdded) {
   EXPECT_EQ((*second)->state().state(), v1::Job::DONE);
 }
 
-TEST(JobsTest, PausedTheBackgroundStandsStillInTheMidstAndGoesOnAfterwards) {
+TEST(JobsThreads, PausedTheBackgroundStandsStillInTheMidstAndGoesOnAfterwards) {
   Asking asking;
   Jobs jobs;
   const auto job = *jobs.add(asking.job("a"));
@@ -107,7 +107,7 @@ TEST(JobsTest, PausedTheBackgroundStandsStillInTheMidstAndGoesOnAfterwards) {
   EXPECT_EQ(asking.told, "a: well");
 }
 
-TEST(JobsTest, TheyEndAtOnceWithTheirOwnerAndTellNothingOfWhatWasCutShort) {
+TEST(JobsThreads, TheyEndAtOnceWithTheirOwnerAndTellNothingOfWhatWasCutShort) {
   Asking asking;
   std::atomic<bool> began = false;
   {
@@ -120,7 +120,7 @@ TEST(JobsTest, TheyEndAtOnceWithTheirOwnerAndTellNothingOfWhatWasCutShort) {
   EXPECT_FALSE(began);
 }
 
-TEST(JobsTest, TheyEndWhilePaused) {
+TEST(JobsThreads, TheyEndWhilePaused) {
   Asking asking;
   Jobs jobs;
   ASSERT_TRUE(jobs.add(asking.job("a")).ok());
@@ -128,7 +128,7 @@ TEST(JobsTest, TheyEndWhilePaused) {
   jobs.pause();
 }
 
-TEST(JobsTest, ACancelledOneEndsAtItsNextStepAndOneThatWaitsNeverBegins) {
+TEST(JobsThreads, ACancelledOneEndsAtItsNextStepAndOneThatWaitsNeverBegins) {
   Asking asking;
   Jobs jobs;
   const auto running = *jobs.add(asking.job("a"));
@@ -148,7 +148,7 @@ TEST(JobsTest, ACancelledOneEndsAtItsNextStepAndOneThatWaitsNeverBegins) {
   EXPECT_EQ(jobs.cancel(77).error().kind, ErrorKind::refused);
 }
 
-TEST(JobsTest, ARecordingsEndGoesOnWhoeverWouldCancelIt) {
+TEST(JobsThreads, ARecordingsEndGoesOnWhoeverWouldCancelIt) {
   Asking asking;
   Jobs jobs;
   const auto job = *jobs.add(asking.job("a", v1::Job::FINISH));
@@ -160,7 +160,7 @@ TEST(JobsTest, ARecordingsEndGoesOnWhoeverWouldCancelIt) {
   EXPECT_TRUE((*job->wait(test::kHangLimit)).ok());
 }
 
-TEST(JobsTest, TooManyThatWaitAreRefused) {
+TEST(JobsThreads, TooManyThatWaitAreRefused) {
   Asking asking;
   Jobs jobs({.asked = 1, .waiting = 1});
   ASSERT_TRUE(jobs.add(asking.job("a", kVerifies)).ok());
@@ -170,7 +170,7 @@ TEST(JobsTest, TooManyThatWaitAreRefused) {
   EXPECT_TRUE(jobs.add({kSalvages, "d", done_at_once}).ok()) << "the background has room";
 }
 
-TEST(JobsTest, ACancelledOneMakesRoomAtOnce) {
+TEST(JobsThreads, ACancelledOneMakesRoomAtOnce) {
   Asking asking;
   Jobs jobs({.asked = 1, .waiting = 1});
   ASSERT_TRUE(jobs.add(asking.job("a", kVerifies)).ok());
@@ -180,7 +180,7 @@ TEST(JobsTest, ACancelledOneMakesRoomAtOnce) {
   EXPECT_TRUE(jobs.add({kVerifies, "c", done_at_once}).ok());
 }
 
-TEST(JobsTest, ACancelledOneThatWaitedTellsWhoeverAddedIt) {
+TEST(JobsThreads, ACancelledOneThatWaitedTellsWhoeverAddedIt) {
   Asking running;
   Asking waiting;
   Jobs jobs;
@@ -193,7 +193,7 @@ TEST(JobsTest, ACancelledOneThatWaitedTellsWhoeverAddedIt) {
   EXPECT_EQ(waiting.asked, 0);
 }
 
-TEST(JobsTest, WhileTheyEndNothingNewIsTakenButARecordingsEnd) {
+TEST(JobsThreads, WhileTheyEndNothingNewIsTakenButARecordingsEnd) {
   std::atomic<bool> began = false;
   Asking asking;
   Jobs jobs;
@@ -210,7 +210,7 @@ TEST(JobsTest, WhileTheyEndNothingNewIsTakenButARecordingsEnd) {
   EXPECT_FALSE(began);
 }
 
-TEST(JobsTest, OneThatTellsNothingHangs) {
+TEST(JobsThreads, OneThatTellsNothingHangs) {
   Jobs jobs;
   std::promise<void> go_on;
   const auto job = *jobs.add({kVerifies, "a", after([&] { go_on.get_future().wait(); })});
@@ -222,14 +222,14 @@ TEST(JobsTest, OneThatTellsNothingHangs) {
   EXPECT_THAT(jobs.hanging(Seconds(0)), IsEmpty());
 }
 
-TEST(JobsTest, AHangingOneEndsNoDaemonWhoseMemoryHoldsFrames) {
+TEST(JobsThreads, AHangingOneEndsNoDaemonWhoseMemoryHoldsFrames) {
   EXPECT_FALSE(tolerates_hanging(v1::LOCKED, kVerifies));
   EXPECT_TRUE(tolerates_hanging(v1::CAPTURING, kVerifies));
   EXPECT_TRUE(tolerates_hanging(v1::FINISHING, kVerifies));
   EXPECT_FALSE(tolerates_hanging(v1::FINISHING, v1::Job::FINISH)) << "it writes them no more";
 }
 
-TEST(JobsTest, WhoWatchesHearsOfEachChangeUntilItStopsWatching) {
+TEST(JobsThreads, WhoWatchesHearsOfEachChangeUntilItStopsWatching) {
   Asking asking;
   Jobs jobs;
   const auto job = *jobs.add(asking.job("a", kVerifies));
@@ -250,7 +250,7 @@ TEST(JobsTest, WhoWatchesHearsOfEachChangeUntilItStopsWatching) {
   EXPECT_FALSE(job->news(seen));
 }
 
-TEST(JobsTest, TheyLeaveTheProcessorToOthersAndWhoIsToldMayAddMore) {
+TEST(JobsThreads, TheyLeaveTheProcessorToOthersAndWhoIsToldMayAddMore) {
   Jobs jobs;
   const auto niceness = [] { return ::getpriority(PRIO_PROCESS, static_cast<id_t>(::gettid())); };
   std::atomic<int> salvaging = 0, verifying = 0, finishing = -1;

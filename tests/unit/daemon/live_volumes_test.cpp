@@ -18,7 +18,7 @@ namespace {
 using testing::HasSubstr;
 using Live = v1::LiveStatus;
 
-class LiveVolumesTest : public testing::Test {
+class LiveVolumesThreads : public testing::Test {
  protected:
   /// `cat $ROOT/volume >&3` sends a volume.
   void start(const std::string& script) {
@@ -64,7 +64,7 @@ class LiveVolumesTest : public testing::Test {
   std::unique_ptr<LiveVolumes> live_;
 };
 
-TEST_F(LiveVolumesTest, AVolumeIsShownWithItsDelay) {
+TEST_F(LiveVolumesThreads, AVolumeIsShownWithItsDelay) {
   start("cat $ROOT/volume >&3; exec sleep 100");
   ASSERT_TRUE(reach(Live::RUNNING));
   const v1::LiveStatus status = *live_->status();
@@ -79,7 +79,7 @@ TEST_F(LiveVolumesTest, AVolumeIsShownWithItsDelay) {
   EXPECT_TRUE(board_.notices(0).empty());
 }
 
-TEST_F(LiveVolumesTest, TheChildIsToldTheSessionFirstAndRunsAtTheLowestPriority) {
+TEST_F(LiveVolumesThreads, TheChildIsToldTheSessionFirstAndRunsAtTheLowestPriority) {
   // The parent lowers it when it has started it.
   start(
       "until [ $(nice) = 19 ]; do sleep 0.01; done; head -c 3 > $ROOT/head; cat $ROOT/volume >&3; exec sleep "
@@ -88,7 +88,7 @@ TEST_F(LiveVolumesTest, TheChildIsToldTheSessionFirstAndRunsAtTheLowestPriority)
   EXPECT_EQ(test::bytes_of(root_ / "head").size(), 3U);
 }
 
-TEST_F(LiveVolumesTest, ItStandsStillWhileTheRecordingHasTroubleAndGoesOn) {
+TEST_F(LiveVolumesThreads, ItStandsStillWhileTheRecordingHasTroubleAndGoesOn) {
   start("echo $$ > $ROOT/pid.new; mv $ROOT/pid.new $ROOT/pid; cat $ROOT/volume >&3; exec sleep 100");
   ASSERT_TRUE(reach(Live::RUNNING));
   offer(0.6);
@@ -102,7 +102,7 @@ TEST_F(LiveVolumesTest, ItStandsStillWhileTheRecordingHasTroubleAndGoesOn) {
   EXPECT_TRUE(test::wait_until([&] { return process_state() == "S"; }));
 }
 
-TEST_F(LiveVolumesTest, ItEndsWithAFrameThatTheRecordingLoses) {
+TEST_F(LiveVolumesThreads, ItEndsWithAFrameThatTheRecordingLoses) {
   start("cat $ROOT/volume >&3; exec sleep 100");
   ASSERT_TRUE(reach(Live::RUNNING));
   offer(0, 1);
@@ -113,7 +113,7 @@ TEST_F(LiveVolumesTest, ItEndsWithAFrameThatTheRecordingLoses) {
   EXPECT_EQ(live_->status()->state(), Live::STOPPED);
 }
 
-TEST_F(LiveVolumesTest, AChildThatDiesIsTold) {
+TEST_F(LiveVolumesThreads, AChildThatDiesIsTold) {
   start("kill -9 $$");
   ASSERT_TRUE(reach(Live::FAILED));
   EXPECT_THAT(live_->status()->reason(), HasSubstr("was killed"));
@@ -128,7 +128,7 @@ TEST_F(LiveVolumesTest, AChildThatDiesIsTold) {
   EXPECT_THAT(live_->status()->reason(), HasSubstr("can't be understood"));
 }
 
-TEST_F(LiveVolumesTest, WithoutTheProgramThereAreNone) {
+TEST_F(LiveVolumesThreads, WithoutTheProgramThereAreNone) {
   LiveOptions options;
   options.program = root_ / "nowhere";
   live_ = std::make_unique<LiveVolumes>(options, board_);

@@ -23,7 +23,9 @@ using testing::HasSubstr;
 using testing::Not;
 using State = v1::ReconstructionStatus;
 
-TEST_F(ReconstructionChildTest, ShowsEveryIterationAndEndsWithTheResult) {
+using ReconstructionChildThreads = ReconstructionChildTest;
+
+TEST_F(ReconstructionChildThreads, ShowsEveryIterationAndEndsWithTheResult) {
   done_message();
   v1::ChildMessage iteration;
   iteration.mutable_iteration()->mutable_iteration()->set_iteration(1);
@@ -44,7 +46,7 @@ TEST_F(ReconstructionChildTest, ShowsEveryIterationAndEndsWithTheResult) {
                                         "/results/candle/middle-frame --progress-fd 3");
 }
 
-TEST_F(ReconstructionChildTest, WhatIsAskedReachesTheProgram) {
+TEST_F(ReconstructionChildThreads, WhatIsAskedReachesTheProgram) {
   options_.unasked.set_budget_s(100);
   options_.threads = 2;
   v1::ReconstructRequest wanted = request();
@@ -72,7 +74,7 @@ v1::SpectralResponse two_wavelengths() {
   return response;
 }
 
-TEST_F(ReconstructionChildTest, TemperaturesAreAskedOfTheProgramWithTheResponseOnItsInput) {
+TEST_F(ReconstructionChildThreads, TemperaturesAreAskedOfTheProgramWithTheResponseOnItsInput) {
   done_message();
   v1::ReconstructRequest asked = request();
   asked.set_quantity("temperature");
@@ -97,7 +99,7 @@ TEST_F(ReconstructionChildTest, TemperaturesAreAskedOfTheProgramWithTheResponseO
   EXPECT_EQ(test::bytes_of(root_ / "response"), "") << "nothing to read";
 }
 
-TEST_F(ReconstructionChildTest, WhatNoTemperatureCanBeReadByIsRefused) {
+TEST_F(ReconstructionChildThreads, WhatNoTemperatureCanBeReadByIsRefused) {
   ReconstructionChild& child = with_script("echo x > $ROOT/begun");
   const auto refusal = [&](auto change) {
     v1::ReconstructRequest wrong = request();
@@ -141,7 +143,7 @@ TEST_F(ReconstructionChildTest, WhatNoTemperatureCanBeReadByIsRefused) {
   EXPECT_FALSE(fs::exists(root_ / "begun"));
 }
 
-TEST_F(ReconstructionChildTest, ACrashIsNamedWithItsLastWords) {
+TEST_F(ReconstructionChildThreads, ACrashIsNamedWithItsLastWords) {
   const auto status = end_of("echo first; for i in 1 2 3 4 5 6; do echo line $i >&2; done; kill -SEGV $$");
   EXPECT_EQ(status.state(), State::FAILED);
   EXPECT_THAT(status.error(), HasSubstr("SIGSEGV"));
@@ -149,11 +151,11 @@ TEST_F(ReconstructionChildTest, ACrashIsNamedWithItsLastWords) {
   EXPECT_THAT(status.error(), Not(HasSubstr("line 1")));
 }
 
-TEST_F(ReconstructionChildTest, LastWordsInNoAlphabetAreStillASentence) {
+TEST_F(ReconstructionChildThreads, LastWordsInNoAlphabetAreStillASentence) {
   EXPECT_THAT(end_of("printf 'a\\377\\033[1mb' >&2; exit 1").error(), HasSubstr("a??[1mb"));
 }
 
-TEST_F(ReconstructionChildTest, OneThatHangsIsKilled) {
+TEST_F(ReconstructionChildThreads, OneThatHangsIsKilled) {
   options_.silence = Seconds(0.2);
   const auto status = end_of("trap '' TERM; while :; do sleep 0.05; done");
   EXPECT_EQ(status.state(), State::FAILED);
@@ -161,7 +163,7 @@ TEST_F(ReconstructionChildTest, OneThatHangsIsKilled) {
   EXPECT_TRUE(scripts_go_away());
 }
 
-TEST_F(ReconstructionChildTest, OneThatTellsSomethingInTimeDoesNotHang) {
+TEST_F(ReconstructionChildThreads, OneThatTellsSomethingInTimeDoesNotHang) {
   options_.silence = Seconds(2);
   done_message();
   v1::ChildMessage progress;
@@ -175,37 +177,37 @@ TEST_F(ReconstructionChildTest, OneThatTellsSomethingInTimeDoesNotHang) {
   EXPECT_EQ(status.state(), State::DONE) << status.error();
 }
 
-TEST_F(ReconstructionChildTest, GarbageEndsIt) {
+TEST_F(ReconstructionChildThreads, GarbageEndsIt) {
   const auto status = end_of("printf '\\004\\377\\377\\377\\377' >&3; sleep 100");
   EXPECT_EQ(status.state(), State::FAILED);
   EXPECT_THAT(status.error(), HasSubstr("can't be understood"));
 }
 
-TEST_F(ReconstructionChildTest, AMessageTooLargeEndsIt) {
+TEST_F(ReconstructionChildThreads, AMessageTooLargeEndsIt) {
   EXPECT_THAT(end_of("printf '\\377\\377\\377\\177' >&3; cat /dev/zero >&3").error(), HasSubstr("over"));
 }
 
-TEST_F(ReconstructionChildTest, ItsOwnWordsOfItsFailureAreTheError) {
+TEST_F(ReconstructionChildThreads, ItsOwnWordsOfItsFailureAreTheError) {
   v1::ChildMessage failure;
   failure.mutable_failure()->set_message("candle: no box. Give --box");
   message("failure", failure);
   EXPECT_EQ(end_of("cat $ROOT/failure >&3; exit 2").error(), "candle: no box. Give --box");
 }
 
-TEST_F(ReconstructionChildTest, OneThatClosesItsPipeAndLivesOnHangs) {
+TEST_F(ReconstructionChildThreads, OneThatClosesItsPipeAndLivesOnHangs) {
   options_.silence = Seconds(0.2);
   EXPECT_THAT(end_of("exec 3>&-; exec 2>&-; sleep 100").error(), HasSubstr("told nothing"));
   options_.silence = ReconstructionOptions().silence;
   EXPECT_THAT(end_of("exec 3>&-; exit 0").error(), HasSubstr("without a result"));
 }
 
-TEST_F(ReconstructionChildTest, WhatItLeavesBehindIsKilledAndKeepsNobodyWaiting) {
+TEST_F(ReconstructionChildThreads, WhatItLeavesBehindIsKilledAndKeepsNobodyWaiting) {
   const auto status = end_of("sleep 100 & echo $! > $ROOT/pid; exit 1");
   EXPECT_EQ(status.state(), State::FAILED);
   EXPECT_TRUE(goes_away(wait_for_line("pid")));
 }
 
-TEST_F(ReconstructionChildTest, CancelledItEndsAndTheNextCanStart) {
+TEST_F(ReconstructionChildThreads, CancelledItEndsAndTheNextCanStart) {
   ReconstructionChild& child = with_script("echo x > $ROOT/begun; exec sleep 100");
   EXPECT_EQ(child.cancel().error().kind, ErrorKind::refused);
   ASSERT_TRUE(child.start(request()).ok());
@@ -218,7 +220,7 @@ TEST_F(ReconstructionChildTest, CancelledItEndsAndTheNextCanStart) {
   EXPECT_TRUE(child.start(request()).ok());
 }
 
-TEST_F(ReconstructionChildTest, OneThatIgnoresTheCancelIsKilledAfterTheGrace) {
+TEST_F(ReconstructionChildThreads, OneThatIgnoresTheCancelIsKilledAfterTheGrace) {
   options_.grace = Seconds(0.1);
   ReconstructionChild& child = with_script("trap '' TERM; echo $$ > $ROOT/pid; while :; do sleep 0.05; done");
   ASSERT_TRUE(child.start(request()).ok());
@@ -228,7 +230,7 @@ TEST_F(ReconstructionChildTest, OneThatIgnoresTheCancelIsKilledAfterTheGrace) {
   EXPECT_TRUE(goes_away(pid));
 }
 
-TEST_F(ReconstructionChildTest, ItIsAJobThatAnybodyMayCancel) {
+TEST_F(ReconstructionChildThreads, ItIsAJobThatAnybodyMayCancel) {
   ASSERT_TRUE(with_script("echo x > $ROOT/begun; exec sleep 100").start(request()).ok());
   wait_for_line("begun");
   const auto job = jobs_->find(v1::Job::RECONSTRUCT, "candle");
@@ -237,7 +239,7 @@ TEST_F(ReconstructionChildTest, ItIsAJobThatAnybodyMayCancel) {
   EXPECT_EQ(end().state(), State::CANCELLED);
 }
 
-TEST_F(ReconstructionChildTest, EndKillsTheOneThatRuns) {
+TEST_F(ReconstructionChildThreads, EndKillsTheOneThatRuns) {
   ASSERT_TRUE(with_script("echo $$ > $ROOT/pid; exec sleep 100").start(request()).ok());
   const std::string pid = wait_for_line("pid");
   child_->end();
@@ -245,7 +247,7 @@ TEST_F(ReconstructionChildTest, EndKillsTheOneThatRuns) {
   EXPECT_EQ(end().state(), State::CANCELLED);
 }
 
-TEST_F(ReconstructionChildTest, ItHoldsNoneOfOurFilesAndLetsOthersGoFirst) {
+TEST_F(ReconstructionChildThreads, ItHoldsNoneOfOurFilesAndLetsOthersGoFirst) {
   const UniqueFd ours(::open((root_ / "ours").c_str(), O_CREAT | O_RDONLY, 0600));  // not closed on exec
   // The parent raises it when it has started it.
   end_of("until [ $(nice) -ge 10 ]; do :; done; ls -l /proc/$$/fd > $ROOT/held; nice > $ROOT/nice");
@@ -255,14 +257,14 @@ TEST_F(ReconstructionChildTest, ItHoldsNoneOfOurFilesAndLetsOthersGoFirst) {
   EXPECT_GE(std::stoi(wait_for_line("nice")), 10);
 }
 
-TEST_F(ReconstructionChildTest, AProgramThatIsNotThereIsNamed) {
+TEST_F(ReconstructionChildThreads, AProgramThatIsNotThereIsNamed) {
   with_script("");
   fs::remove(root_ / "program");
   ASSERT_TRUE(child_->start(request()).ok());
   EXPECT_THAT(end().error(), HasSubstr(options_.program.string()));
 }
 
-TEST_F(ReconstructionChildTest, SessionsOutsideTheFolderAndValuesOutOfRangeAreRefused) {
+TEST_F(ReconstructionChildThreads, SessionsOutsideTheFolderAndValuesOutOfRangeAreRefused) {
   fs::create_directories(root_ / "elsewhere");
   std::ofstream(root_ / "elsewhere/manifest.json") << "{}";
   ReconstructionChild& child = with_script("echo x > $ROOT/begun");
@@ -294,7 +296,7 @@ v1::ReconstructRequest range(std::uint64_t first, std::uint64_t last, std::uint3
   return request;
 }
 
-TEST_F(ReconstructionChildTest, ASequenceIsOneJobOfAChildForEachFrame) {
+TEST_F(ReconstructionChildThreads, ASequenceIsOneJobOfAChildForEachFrame) {
   done_message();
   v1::ChildMessage kept;
   test::fill(*kept.mutable_iteration()->mutable_volume(), 1, 1, 1, "v");
@@ -326,7 +328,7 @@ TEST_F(ReconstructionChildTest, ASequenceIsOneJobOfAChildForEachFrame) {
   EXPECT_TRUE(jobs_->list().empty());
 }
 
-TEST_F(ReconstructionChildTest, ASequenceThatIsCancelledKeepsWhatIsDone) {
+TEST_F(ReconstructionChildThreads, ASequenceThatIsCancelledKeepsWhatIsDone) {
   done_message();
   ReconstructionChild& child = with_script(
       "case \"$*\" in *'--frame 1'*) echo x > $ROOT/begun; exec sleep 100;; esac; cat $ROOT/done >&3");
@@ -341,7 +343,7 @@ TEST_F(ReconstructionChildTest, ASequenceThatIsCancelledKeepsWhatIsDone) {
   EXPECT_EQ(status.frames(2).state(), State::STATE_UNSPECIFIED);
 }
 
-TEST_F(ReconstructionChildTest, ASequenceThatHasNoSuchFramesIsRefused) {
+TEST_F(ReconstructionChildThreads, ASequenceThatHasNoSuchFramesIsRefused) {
   ReconstructionChild& child = with_script("echo x > $ROOT/begun");
   v1::ReconstructRequest without_first = range(0, 3);
   without_first.clear_frame();

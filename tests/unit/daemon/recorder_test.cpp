@@ -27,7 +27,7 @@ session::Arrivals arrivals(const std::vector<std::uint64_t>& ids) {
   return arrivals;
 }
 
-TEST(Recorder, WhatTheDriverLostExplainsMissingNumbersAndNoMore) {
+TEST(RecorderThreads, WhatTheDriverLostExplainsMissingNumbersAndNoMore) {
   CameraBooks books;
   books.arrivals = arrivals({1, 2, 5, 6, 9});  // 3, 4, 7, 8
   drivers::FrameCounts before;
@@ -44,7 +44,7 @@ TEST(Recorder, WhatTheDriverLostExplainsMissingNumbersAndNoMore) {
   EXPECT_EQ(explained.passed_over(), 1);
 }
 
-TEST(Recorder, BooksThatDoNotAgreeAreNamed) {
+TEST(RecorderThreads, BooksThatDoNotAgreeAreNamed) {
   CameraBooks books;
   books.driver.delivered = 5;
   books.left_out = 2;
@@ -61,7 +61,7 @@ TEST(Recorder, BooksThatDoNotAgreeAreNamed) {
   EXPECT_THAT(disagreement(books, file), HasSubstr("the driver handed on 6 frames"));
 }
 
-class Recording : public ::testing::Test {
+class RecordingThreads : public ::testing::Test {
  protected:
   std::unique_ptr<Recorder> begin(TimePoint now, const std::vector<drivers::FrameCounts>& before = {{}, {}}) {
     RecorderOptions options;
@@ -72,7 +72,7 @@ class Recording : public ::testing::Test {
   test::TempFolder temp_;
 };
 
-TEST_F(Recording, FramesFilmedBeforeItBeganAreLeftOut) {
+TEST_F(RecordingThreads, FramesFilmedBeforeItBeganAreLeftOut) {
   auto recorder = begin(test::noise_frame(kLayout, 3).stamp.monotonic_time);
   std::vector<drivers::FrameCounts> after(2);
   for (std::uint64_t i = 0; i < 10; ++i) {
@@ -90,7 +90,7 @@ TEST_F(Recording, FramesFilmedBeforeItBeganAreLeftOut) {
   EXPECT_EQ(session->read(1, 6)->image->bytes(), test::noise_frame(kLayout, 9).image->bytes());
 }
 
-TEST_F(Recording, ItEndsAtTheSameInstantForAllHoweverLateTheirFramesCome) {
+TEST_F(RecordingThreads, ItEndsAtTheSameInstantForAllHoweverLateTheirFramesCome) {
   auto recorder = begin({});
   const TimePoint end = test::noise_frame(kLayout, 6).stamp.monotonic_time;
   recorder->take(1, test::noise_frame(kLayout, 0));
@@ -110,7 +110,7 @@ TEST_F(Recording, ItEndsAtTheSameInstantForAllHoweverLateTheirFramesCome) {
   EXPECT_EQ(status.seconds(), (end - TimePoint{}).value());
 }
 
-TEST_F(Recording, EveryLossStandsInTheManifestUnderItsCause) {
+TEST_F(RecordingThreads, EveryLossStandsInTheManifestUnderItsCause) {
   std::vector<drivers::FrameCounts> counts(2);
   counts[0].transport = 7;  // from before
   auto recorder = begin({}, counts);
@@ -126,7 +126,7 @@ TEST_F(Recording, EveryLossStandsInTheManifestUnderItsCause) {
   EXPECT_THAT(status.verdict(), HasSubstr("2 lost: 1 by cameras, 1 on the way"));
 }
 
-TEST_F(Recording, AFrameThatTheDriverCountedAndNobodyTookIsRed) {
+TEST_F(RecordingThreads, AFrameThatTheDriverCountedAndNobodyTookIsRed) {
   auto recorder = begin({});
   recorder->take(0, test::noise_frame(kLayout, 0));
   std::vector<drivers::FrameCounts> after(2);
@@ -136,7 +136,7 @@ TEST_F(Recording, AFrameThatTheDriverCountedAndNobodyTookIsRed) {
   EXPECT_THAT(status.verdict(), HasSubstr("cam0: the driver handed on 2 frames"));
 }
 
-TEST_F(Recording, TellsHowFarItIsAndCallsRecordedWhatIsSafe) {
+TEST_F(RecordingThreads, TellsHowFarItIsAndCallsRecordedWhatIsSafe) {
   auto recorder = begin({});
   for (std::uint64_t i = 0; i < 5; ++i) recorder->take(0, test::noise_frame(kLayout, i));
   const TimePoint now = TimePoint{} + Seconds(2);
@@ -156,7 +156,7 @@ TEST_F(Recording, TellsHowFarItIsAndCallsRecordedWhatIsSafe) {
 }
 
 /// A segment that takes 64 KiB, and then nothing until somebody reads: a disk that hangs.
-TEST_F(Recording, OfADiskThatHangsNothingIsCalledRecorded) {
+TEST_F(RecordingThreads, OfADiskThatHangsNothingIsCalledRecorded) {
   const ImageLayout large{.size = {160, 120}};
   RecorderOptions options;
   options.writer = test::small_disk_options(session::Encoding::raw_nut);
@@ -194,7 +194,7 @@ TEST_F(Recording, OfADiskThatHangsNothingIsCalledRecorded) {
   EXPECT_EQ(status.lost().queue() + status.lost().disk(), taken);
 }
 
-TEST_F(Recording, BelowTheFloorOfFreeSpaceNoneIsBegunAndNoFolderIsLeft) {
+TEST_F(RecordingThreads, BelowTheFloorOfFreeSpaceNoneIsBegunAndNoFolderIsLeft) {
   RecorderOptions options;
   options.writer.min_free_bytes = std::uint64_t{1} << 60;
   const auto refused = Recorder::begin(temp_ / "take", test::manifest_of({kLayout}), options, {{}}, {});

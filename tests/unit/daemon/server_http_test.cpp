@@ -24,9 +24,9 @@ using testing::HasSubstr;
 using testing::IsEmpty;
 using testing::Not;
 
-class ServerHttpTest : public test::HttpServerTest {
+class ServerHttpThreads : public test::HttpServerTest {
  protected:
-  ServerHttpTest() {
+  ServerHttpThreads() {
     test::put_bytes(folder / "console/assets/main-0a1b2c3d.js", "start()");
     test::put_bytes(folder / "secret", "secret");
     std::filesystem::create_symlink(folder / "secret", folder / "console/link.txt");
@@ -41,7 +41,7 @@ class ServerHttpTest : public test::HttpServerTest {
   }
 };
 
-TEST_F(ServerHttpTest, TheConsoleIsServedAndOnlyItsHashedNamesAreKeptForGood) {
+TEST_F(ServerHttpThreads, TheConsoleIsServedAndOnlyItsHashedNamesAreKeptForGood) {
   serve();
   const HttpAnswer page = ask(port, "GET", "/");
   EXPECT_EQ(page.status, 200);
@@ -56,7 +56,7 @@ TEST_F(ServerHttpTest, TheConsoleIsServedAndOnlyItsHashedNamesAreKeptForGood) {
   EXPECT_THAT(script.head, HasSubstr("immutable"));
 }
 
-TEST_F(ServerHttpTest, WhatABrowserHasAlreadyIsNotSentAgain) {
+TEST_F(ServerHttpThreads, WhatABrowserHasAlreadyIsNotSentAgain) {
   serve();
   const HttpAnswer page = ask(port, "GET", "/");
   const std::size_t at = page.head.find("ETag: ");
@@ -71,7 +71,7 @@ TEST_F(ServerHttpTest, WhatABrowserHasAlreadyIsNotSentAgain) {
   EXPECT_THAT(head.head, HasSubstr("Content-Length: 22"));
 }
 
-TEST_F(ServerHttpTest, NoPathLeadsOutOfTheConsole) {
+TEST_F(ServerHttpThreads, NoPathLeadsOutOfTheConsole) {
   serve();
   for (const char* path : {"/../secret", "/assets/../../secret", "/%2e%2e/secret", "/..%2fsecret", "//secret",
                            "/link.txt", "/./secret", "/console/../secret", "secret", "../secret", "*",
@@ -82,7 +82,7 @@ TEST_F(ServerHttpTest, NoPathLeadsOutOfTheConsole) {
   }
 }
 
-TEST_F(ServerHttpTest, CallsAreAskedOfTheApiInJson) {
+TEST_F(ServerHttpThreads, CallsAreAskedOfTheApiInJson) {
   api.on_record = [](const v1::RecordRequest& request) {
     v1::RecordingStatus status;
     status.set_session(request.name());
@@ -98,7 +98,7 @@ TEST_F(ServerHttpTest, CallsAreAskedOfTheApiInJson) {
   EXPECT_THAT(api.calls(), ElementsAre("record name: \"flame 1\" unlocked: true", "stop_sync"));
 }
 
-TEST_F(ServerHttpTest, AnErrorHasItsCodeAndTheWholeMessage) {
+TEST_F(ServerHttpThreads, AnErrorHasItsCodeAndTheWholeMessage) {
   api.on_stop_sync = [] { return Error{ErrorKind::refused, "nothing is aligned", "sync", "align first"}; };
   serve();
   const HttpAnswer answer = ask(port, "POST", "/api/v1/Sync/Stop");
@@ -107,7 +107,7 @@ TEST_F(ServerHttpTest, AnErrorHasItsCodeAndTheWholeMessage) {
             json({{"code", "FAILED_PRECONDITION"}, {"message", "sync: nothing is aligned. Align first"}}));
 }
 
-TEST_F(ServerHttpTest, WhatIsNoRequestOfOursIsRefusedAndNeverReachesTheApi) {
+TEST_F(ServerHttpThreads, WhatIsNoRequestOfOursIsRefusedAndNeverReachesTheApi) {
   serve();
   const struct {
     const char* method;
@@ -132,7 +132,7 @@ TEST_F(ServerHttpTest, WhatIsNoRequestOfOursIsRefusedAndNeverReachesTheApi) {
   EXPECT_THAT(api.calls(), IsEmpty());
 }
 
-TEST_F(ServerHttpTest, OversizedAndMalformedRequestsAreRefused) {
+TEST_F(ServerHttpThreads, OversizedAndMalformedRequestsAreRefused) {
   serve();
   EXPECT_EQ(ask(port, "GET", "/" + std::string(20'000, 'a')).status, 431);
   EXPECT_EQ(ask(port, "GET", "/", "", test::kLetIn + "X: " + std::string(20'000, 'a') + "\r\n").status, 431);
@@ -142,7 +142,7 @@ TEST_F(ServerHttpTest, OversizedAndMalformedRequestsAreRefused) {
   EXPECT_THAT(api.calls(), IsEmpty());
 }
 
-TEST_F(ServerHttpTest, AClientThatDawdlesIsCutOff) {
+TEST_F(ServerHttpThreads, AClientThatDawdlesIsCutOff) {
   serve({.patience = milliseconds(100)});
   const UniqueFd idle = test::connect_to(port);
   const UniqueFd in_head = test::connect_to(port);
@@ -157,7 +157,7 @@ TEST_F(ServerHttpTest, AClientThatDawdlesIsCutOff) {
   EXPECT_TRUE(wait_until([&] { return ask(port, "GET", "/").status == 200; }));
 }
 
-TEST_F(ServerHttpTest, BeyondTheQueueCallsAreRefused) {
+TEST_F(ServerHttpThreads, BeyondTheQueueCallsAreRefused) {
   std::promise<void> go;
   const std::shared_future<void> gone = go.get_future().share();
   std::atomic<int> running = 0;
@@ -175,7 +175,7 @@ TEST_F(ServerHttpTest, BeyondTheQueueCallsAreRefused) {
   EXPECT_EQ(first.get(), 200);
 }
 
-TEST_F(ServerHttpTest, AnotherSitesPageAndAForeignNameAreTurnedAway) {
+TEST_F(ServerHttpThreads, AnotherSitesPageAndAForeignNameAreTurnedAway) {
   serve();
   const std::string kShown = std::string("Authorization: Bearer ") + test::kHttpToken + "\r\n";
   const auto status_for = [&](const std::string& headers) {
@@ -194,7 +194,7 @@ TEST_F(ServerHttpTest, AnotherSitesPageAndAForeignNameAreTurnedAway) {
   EXPECT_EQ(api.calls().size(), 3U);
 }
 
-TEST_F(ServerHttpTest, AJobTellsALineForEachProgressAndItsLast) {
+TEST_F(ServerHttpThreads, AJobTellsALineForEachProgressAndItsLast) {
   api.on_job = test::job_that_tells(100);
   serve();
   const HttpAnswer answer = ask(port, "POST", "/api/v1/Sessions/Verify", R"({"session": "s"})");
@@ -204,14 +204,14 @@ TEST_F(ServerHttpTest, AJobTellsALineForEachProgressAndItsLast) {
   EXPECT_THAT(answer.body, HasSubstr("\"outcome\":{}}\n\r\n0\r\n\r\n"));
 }
 
-TEST_F(ServerHttpTest, AJobThatCannotBeginIsAnError) {
+TEST_F(ServerHttpThreads, AJobThatCannotBeginIsAnError) {
   api.on_begin = Error{ErrorKind::bad_input, "no such session", "x"};
   serve();
   EXPECT_EQ(ask(port, "POST", "/api/v1/Sessions/Repair", R"({"session": "x"})").status, 400);
   EXPECT_EQ(ask(port, "POST", "/api/v1/Sessions/Repair", "x").status, 400);
 }
 
-TEST_F(ServerHttpTest, AJobThatFailsOnItsWayEndsItsStreamWithTheError) {
+TEST_F(ServerHttpThreads, AJobThatFailsOnItsWayEndsItsStreamWithTheError) {
   std::atomic<bool> seen = false;
   api.on_job = [&](const Observer& observer) -> JobResult {
     observer(0, "writes");
@@ -232,7 +232,7 @@ TEST_F(ServerHttpTest, AJobThatFailsOnItsWayEndsItsStreamWithTheError) {
   }
 }
 
-TEST_F(ServerHttpTest, AStepOfAStylizationComesWithItsPictureInBase64) {
+TEST_F(ServerHttpThreads, AStepOfAStylizationComesWithItsPictureInBase64) {
   api.on_edit_reconstruction = test::step_with_picture;
   serve();
   const std::string path = "/api/v1/Reconstruct/Edit";
@@ -244,7 +244,7 @@ TEST_F(ServerHttpTest, AStepOfAStylizationComesWithItsPictureInBase64) {
   EXPECT_EQ(ask(port, "POST", "/api/v1/Reconstruct/Finish", "{}").status, 200);
 }
 
-TEST_F(ServerHttpTest, AFrameThatIsNotHeldIsNotFound) {
+TEST_F(ServerHttpThreads, AFrameThatIsNotHeldIsNotFound) {
   api.on_reconstructed_frame = test::twelfth_frame;
   serve();
   const auto found =
@@ -255,7 +255,7 @@ TEST_F(ServerHttpTest, AFrameThatIsNotHeldIsNotFound) {
   EXPECT_EQ(json::parse(absent.body)["code"], "NOT_FOUND");
 }
 
-TEST_F(ServerHttpTest, AFlameOnAMarkerIsAskedForByNames) {
+TEST_F(ServerHttpThreads, AFlameOnAMarkerIsAskedForByNames) {
   api.on_list_results = [] {
     v1::ListResultsResponse listed;
     listed.add_results()->set_session("candle");
@@ -280,7 +280,7 @@ TEST_F(ServerHttpTest, AFlameOnAMarkerIsAskedForByNames) {
   EXPECT_EQ(ask(port, "POST", "/api/v1/Ar/Stop", "{}").status, 409);
 }
 
-TEST_F(ServerHttpTest, AJobIsCancelledByItsNumberAndSaysSo) {
+TEST_F(ServerHttpThreads, AJobIsCancelledByItsNumberAndSaysSo) {
   test::EndlessJob endless;
   serve();
   const UniqueFd client = begin(endless);
@@ -290,14 +290,14 @@ TEST_F(ServerHttpTest, AJobIsCancelledByItsNumberAndSaysSo) {
   EXPECT_TRUE(endless.ended());
 }
 
-TEST_F(ServerHttpTest, AJobEndsWhenItsClientGoesInMidStream) {
+TEST_F(ServerHttpThreads, AJobEndsWhenItsClientGoesInMidStream) {
   test::EndlessJob endless;
   serve();
   { const UniqueFd client = begin(endless); }
   EXPECT_TRUE(wait_until([&] { return endless.ended(); }));
 }
 
-TEST_F(ServerHttpTest, TheServerGoesWhileJobsRun) {
+TEST_F(ServerHttpThreads, TheServerGoesWhileJobsRun) {
   test::EndlessJob endless;
   serve();
   const UniqueFd client = begin(endless);
@@ -305,7 +305,7 @@ TEST_F(ServerHttpTest, TheServerGoesWhileJobsRun) {
   EXPECT_TRUE(wait_until([&] { return endless.ended(); }));
 }
 
-TEST_F(ServerHttpTest, HealthAndMetricsFollowTheEngine) {
+TEST_F(ServerHttpThreads, HealthAndMetricsFollowTheEngine) {
   serve();
   EXPECT_EQ(ask(port, "GET", "/healthz").status, 503);
   show(v1::LOCKED);
@@ -317,7 +317,7 @@ TEST_F(ServerHttpTest, HealthAndMetricsFollowTheEngine) {
   EXPECT_THAT(metrics.body, HasSubstr("emberlock_phase{state=\"locked\"} 1\n"));
 }
 
-TEST_F(ServerHttpTest, ATakenPortIsAnError) {
+TEST_F(ServerHttpThreads, ATakenPortIsAnError) {
   serve();
   const auto second = HttpServer::start(api, {.listen = "127.0.0.1:" + std::to_string(port)});
   ASSERT_FALSE(second.ok());

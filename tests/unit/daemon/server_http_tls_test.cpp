@@ -27,7 +27,7 @@ using testing::StartsWith;
 const std::string kToken = test::kHttpToken;
 const std::string kShown = "Host: lab:7140\r\nAuthorization: Bearer " + kToken + "\r\n";
 
-class ServerHttpTls : public test::HttpServerTest {
+class ServerHttpTlsThreads : public test::HttpServerTest {
  protected:
   HttpServerOptions options() const {
     HttpServerOptions options = with_token({.listen = "0.0.0.0:0"});
@@ -45,7 +45,7 @@ class ServerHttpTls : public test::HttpServerTest {
   std::optional<test::TlsTunnel> tunnel;
 };
 
-TEST_F(ServerHttpTls, BeyondThisMachineItStartsOnlyWithTokenAndCertificate) {
+TEST_F(ServerHttpTlsThreads, BeyondThisMachineItStartsOnlyWithTokenAndCertificate) {
   HttpServerOptions lacking = options();
   lacking.token.reset();
   const auto without_token = HttpServer::start(api, lacking);
@@ -61,7 +61,7 @@ TEST_F(ServerHttpTls, BeyondThisMachineItStartsOnlyWithTokenAndCertificate) {
     EXPECT_FALSE(HttpServer::start(api, {.listen = nowhere}).ok()) << nowhere;
 }
 
-TEST_F(ServerHttpTls, ATokenIsShownAsHeaderOrCookieAndAnAddressWithItGivesTheCookie) {
+TEST_F(ServerHttpTlsThreads, ATokenIsShownAsHeaderOrCookieAndAnAddressWithItGivesTheCookie) {
   serve(options());
   EXPECT_THAT(server->url(), StartsWith("https://0.0.0.0:"));
   const auto get = [&](const std::string& target, const std::string& headers) {
@@ -82,7 +82,7 @@ TEST_F(ServerHttpTls, ATokenIsShownAsHeaderOrCookieAndAnAddressWithItGivesTheCoo
   EXPECT_EQ(get("/metrics", "Cookie: theme=dark; " + cookie + "\r\n").status, 200);
 }
 
-TEST_F(ServerHttpTls, CallsJobsAndMetricsAnswerAsInPlain) {
+TEST_F(ServerHttpTlsThreads, CallsJobsAndMetricsAnswerAsInPlain) {
   api.on_record = test::recording_of_that_name;
   api.on_job = test::job_that_tells(100);
   serve(options());
@@ -99,7 +99,7 @@ TEST_F(ServerHttpTls, CallsJobsAndMetricsAnswerAsInPlain) {
       json({{"session", name}}));
 }
 
-TEST_F(ServerHttpTls, AConsoleWatchesUntilItGoes) {
+TEST_F(ServerHttpTlsThreads, AConsoleWatchesUntilItGoes) {
   serve(options());
   {
     test::WatchClient console(port, kShown);
@@ -117,7 +117,7 @@ TEST_F(ServerHttpTls, AConsoleWatchesUntilItGoes) {
   EXPECT_TRUE(wait_until([&] { return server->viewers() == 0; }));
 }
 
-TEST_F(ServerHttpTls, WhoSpeaksPlainHttpIsToldToSpeakTls) {
+TEST_F(ServerHttpTlsThreads, WhoSpeaksPlainHttpIsToldToSpeakTls) {
   serve(options());
   const HttpAnswer answer = ask(server->port(), "GET", "/?token=" + kToken);
   EXPECT_EQ(answer.status, 400);
@@ -127,7 +127,7 @@ TEST_F(ServerHttpTls, WhoSpeaksPlainHttpIsToldToSpeakTls) {
   EXPECT_EQ(ask(port, "GET", "/metrics", "", kShown).status, 200);
 }
 
-TEST_F(ServerHttpTls, WhoStallsInTheHandshakeIsCutOffAndHoldsNobodyUp) {
+TEST_F(ServerHttpTlsThreads, WhoStallsInTheHandshakeIsCutOffAndHoldsNobodyUp) {
   HttpServerOptions patient = options();
   patient.patience = milliseconds(200);
   serve(patient);
@@ -140,7 +140,7 @@ TEST_F(ServerHttpTls, WhoStallsInTheHandshakeIsCutOffAndHoldsNobodyUp) {
   EXPECT_THAT(test::read_to_end(halfway), IsEmpty());
 }
 
-TEST_F(ServerHttpTls, WithAnAuthorityForClientsWhoHasNoCertificateOfItsIsNotHeardAtAll) {
+TEST_F(ServerHttpTlsThreads, WithAnAuthorityForClientsWhoHasNoCertificateOfItsIsNotHeardAtAll) {
   const test::CertificateAuthority clients("who signs clients");
   HttpServerOptions strict = options();
   strict.tls->clients = clients.pem();
@@ -155,7 +155,7 @@ TEST_F(ServerHttpTls, WithAnAuthorityForClientsWhoHasNoCertificateOfItsIsNotHear
   EXPECT_THAT(api.calls(), IsEmpty());
 }
 
-TEST_F(ServerHttpTls, TheServerGoesWhileConsolesWatch) {
+TEST_F(ServerHttpTlsThreads, TheServerGoesWhileConsolesWatch) {
   serve(options());
   test::WatchClient console(port, kShown);
   ASSERT_TRUE(console.hear());

@@ -83,7 +83,7 @@ TEST(MakePicture, AFrameWithoutPixelsIsAnError) {
   EXPECT_FALSE(make_picture("a", {.stamp = {}, .image = std::make_shared<Image>()}, {}).ok());
 }
 
-TEST(Pictures, NobodyWantsThemNoneAreMade) {
+TEST(PicturesThreads, NobodyWantsThemNoneAreMade) {
   Board board;
   Pictures pictures(board, {});
   pictures.offer("a", flat_frame(PixelFormat::gray8, 8, {64, 48}, 1, 1, 1));
@@ -93,7 +93,7 @@ TEST(Pictures, NobodyWantsThemNoneAreMade) {
   EXPECT_EQ(board.pictures().begin()->first, "b");
 }
 
-TEST(Pictures, ACameraThatFilmsFastIsShownAtTheRateAskedFor) {
+TEST(PicturesThreads, ACameraThatFilmsFastIsShownAtTheRateAskedFor) {
   Board board;
   Pictures pictures(board, {.rate = Hertz(10)});
   const Subscription wanted = board.want_pictures();

@@ -21,7 +21,7 @@ using test::wait_until;
 using test::WatchClient;
 using testing::HasSubstr;
 
-class ServerWatchTest : public test::HttpServerTest {
+class ServerWatchThreads : public test::HttpServerTest {
  protected:
   void serve(HttpServerOptions options = {}) { HttpServerTest::serve(with_token(std::move(options))); }
   std::shared_ptr<const v1::Picture> picture(const std::string& camera, std::uint64_t frame,
@@ -63,7 +63,7 @@ class ServerWatchTest : public test::HttpServerTest {
   }
 };
 
-TEST_F(ServerWatchTest, TheHistoryOfRoundsIsToldWhenItChangedAndNotWithEveryStatus) {
+TEST_F(ServerWatchThreads, TheHistoryOfRoundsIsToldWhenItChangedAndNotWithEveryStatus) {
   v1::DaemonStatus status;
   const auto add_round = [&](std::uint32_t round) {
     v1::RoundPoint& point = *status.mutable_alignment()->add_history();
@@ -91,7 +91,7 @@ TEST_F(ServerWatchTest, TheHistoryOfRoundsIsToldWhenItChangedAndNotWithEveryStat
   EXPECT_EQ(text(console)["rounds"], json::object());
 }
 
-TEST_F(ServerWatchTest, AConsoleIsToldWhatIsAndWhatChanges) {
+TEST_F(ServerWatchThreads, AConsoleIsToldWhatIsAndWhatChanges) {
   show(v1::IDLE);
   api.board().notice(v1::GREEN, "Started.");
   serve();
@@ -103,7 +103,7 @@ TEST_F(ServerWatchTest, AConsoleIsToldWhatIsAndWhatChanges) {
   EXPECT_EQ(text(console)["status"]["phase"], "ALIGNING");
 }
 
-TEST_F(ServerWatchTest, PicturesComeWhileTheyAreWantedAndOfTheCamerasWanted) {
+TEST_F(ServerWatchThreads, PicturesComeWhileTheyAreWantedAndOfTheCamerasWanted) {
   show(v1::IDLE);
   serve();
   WatchClient console(port);
@@ -125,7 +125,7 @@ TEST_F(ServerWatchTest, PicturesComeWhileTheyAreWantedAndOfTheCamerasWanted) {
   EXPECT_TRUE(wait_until([&] { return !api.board().pictures_wanted(); }));
 }
 
-TEST_F(ServerWatchTest, AnIterationComesAsNumbersThenPicturesThenTheVolume) {
+TEST_F(ServerWatchThreads, AnIterationComesAsNumbersThenPicturesThenTheVolume) {
   serve();
   auto preview = std::make_shared<v1::IterationPreview>();
   preview->set_reconstruction("r");
@@ -164,7 +164,7 @@ TEST_F(ServerWatchTest, AnIterationComesAsNumbersThenPicturesThenTheVolume) {
   EXPECT_EQ(volume.bytes, "voxelskelvin");
 }
 
-TEST_F(ServerWatchTest, WhoTalksNonsenseIsPutOutAndTheOthersStay) {
+TEST_F(ServerWatchThreads, WhoTalksNonsenseIsPutOutAndTheOthersStay) {
   serve();
   WatchClient other(port);
   for (const std::string& nonsense :
@@ -185,7 +185,7 @@ TEST_F(ServerWatchTest, WhoTalksNonsenseIsPutOutAndTheOthersStay) {
 }
 
 // The newest always gets in; who makes room is told why, so that its page doesn't come back by itself.
-TEST_F(ServerWatchTest, BeyondTheMostConsolesOneThatNeverSaidWhatItWantsMakesRoom) {
+TEST_F(ServerWatchThreads, BeyondTheMostConsolesOneThatNeverSaidWhatItWantsMakesRoom) {
   serve({.viewers = 2});
   WatchClient idle(port);
   WatchClient spoken(port);
@@ -202,13 +202,13 @@ TEST_F(ServerWatchTest, BeyondTheMostConsolesOneThatNeverSaidWhatItWantsMakesRoo
   EXPECT_TRUE(hears_of_the_lock(spoken)) << "who spoke stays";
 }
 
-TEST_F(ServerWatchTest, AnotherSitesPageMayNotWatch) {
+TEST_F(ServerWatchThreads, AnotherSitesPageMayNotWatch) {
   serve();
   const WatchClient console(port, test::kLetIn + "Origin: http://evil.example\r\n");
   EXPECT_THAT(console.answer(), HasSubstr("403"));
 }
 
-TEST_F(ServerWatchTest, AConsoleThatGivesNoSignOfLifeIsGone) {
+TEST_F(ServerWatchThreads, AConsoleThatGivesNoSignOfLifeIsGone) {
   serve({.patience = milliseconds(200)});
   std::optional<WatchClient> silent;
   // A busy machine may be so slow that its request is cut off.
@@ -218,7 +218,7 @@ TEST_F(ServerWatchTest, AConsoleThatGivesNoSignOfLifeIsGone) {
 
 // 11 cameras, 50 consoles, of which one never reads. The others get every picture, and of those that the one
 // missed nothing is kept.
-TEST_F(ServerWatchTest, OfFiftyConsolesOneStallsAndTheOthersSeeEverything) {
+TEST_F(ServerWatchThreads, OfFiftyConsolesOneStallsAndTheOthersSeeEverything) {
   constexpr std::size_t kConsoles = 49, kCameras = 11, kRounds = 15, kBytes = 40'000;
   serve();
   WatchClient stalled(port);

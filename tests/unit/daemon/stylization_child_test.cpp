@@ -17,7 +17,9 @@ using testing::HasSubstr;
 using testing::Not;
 using Stylizing = v1::ReconstructionStatus;
 
-TEST_F(ReconstructionChildTest, AStylizationIsEditedWhileItRunsAndFinishedWhenAsked) {
+using ReconstructionChildThreads = ReconstructionChildTest;
+
+TEST_F(ReconstructionChildThreads, AStylizationIsEditedWhileItRunsAndFinishedWhenAsked) {
   done_message();
   v1::ChildMessage first;
   first.mutable_iteration()->mutable_stylization()->add_views()->set_name("cam0");
@@ -57,7 +59,7 @@ TEST_F(ReconstructionChildTest, AStylizationIsEditedWhileItRunsAndFinishedWhenAs
   EXPECT_EQ(child.edit(step).error().kind, ErrorKind::refused);
 }
 
-TEST_F(ReconstructionChildTest, WhatNoReplayCouldFollowIsNoStylization) {
+TEST_F(ReconstructionChildThreads, WhatNoReplayCouldFollowIsNoStylization) {
   ReconstructionChild& child = with_script("echo x > $ROOT/begun");
   const auto refusal = [&](auto change) {
     v1::ReconstructRequest wrong = request();

@@ -46,13 +46,13 @@ std::uint64_t whole_frames(const std::filesystem::path& folder) {
   return check && check->whole() ? check->cameras.at(0).good : 0;
 }
 
-class Upkeep : public testing::Test {
+class UpkeepThreads : public testing::Test {
  protected:
   const TempFolder temp;
   const session::SessionStore store = session::SessionStore::open(temp / "store").value();
 };
 
-TEST_F(Upkeep, CompressesWhatIsAddedAndTellsOfEachThatNeededIt) {
+TEST_F(UpkeepThreads, CompressesWhatIsAddedAndTellsOfEachThatNeededIt) {
   record_raw(temp / "a");
   record_raw(temp / "b");
   record(temp / "compressed already", kUpkeptLayout, 3, small_disk_options());
@@ -69,7 +69,7 @@ TEST_F(Upkeep, CompressesWhatIsAddedAndTellsOfEachThatNeededIt) {
   EXPECT_TRUE(jobs.list().empty());
 }
 
-TEST_F(Upkeep, CompressionEndedInTheMidstIsTakenUpByTheNext) {
+TEST_F(UpkeepThreads, CompressionEndedInTheMidstIsTakenUpByTheNext) {
   record_raw(temp / "a");
   {
     Jobs jobs;
@@ -84,7 +84,7 @@ TEST_F(Upkeep, CompressionEndedInTheMidstIsTakenUpByTheNext) {
   EXPECT_EQ(whole_frames(temp / "a"), kUpkeptFrames);
 }
 
-TEST_F(Upkeep, AFailureIsToldAndKeepsWhatCanBeRead) {
+TEST_F(UpkeepThreads, AFailureIsToldAndKeepsWhatCanBeRead) {
   record_raw(temp / "damaged");
   record_raw(temp / "next");
   const auto segment = session::find_segment(temp / "damaged", "cam0", 0);
@@ -125,7 +125,7 @@ struct Told {
   std::vector<std::string> lines;
 };
 
-TEST_F(Upkeep, WhatAnEarlierDaemonLeftIsSalvagedFirstAndThenCompressed) {
+TEST_F(UpkeepThreads, WhatAnEarlierDaemonLeftIsSalvagedFirstAndThenCompressed) {
   record_raw(store.folder() / "a raw");
   record(store.folder() / "b finished", kUpkeptLayout, 5, small_disk_options());
   leave_killed_session(store.folder() / "c killed");
@@ -147,7 +147,7 @@ TEST_F(Upkeep, WhatAnEarlierDaemonLeftIsSalvagedFirstAndThenCompressed) {
   }
 }
 
-TEST_F(Upkeep, ASessionThatWaitsForSalvageIsRefusedForAllElseAndSaysSo) {
+TEST_F(UpkeepThreads, ASessionThatWaitsForSalvageIsRefusedForAllElseAndSaysSo) {
   leave_killed_session(store.folder() / "killed");
   Jobs jobs;
   jobs.pause();
@@ -164,7 +164,7 @@ TEST_F(Upkeep, ASessionThatWaitsForSalvageIsRefusedForAllElseAndSaysSo) {
   EXPECT_TRUE(session::SessionReader::open(store.folder() / "killed").ok());
 }
 
-TEST_F(Upkeep, ASessionThatSomebodyStillRecordsStaysAsItIs) {
+TEST_F(UpkeepThreads, ASessionThatSomebodyStillRecordsStaysAsItIs) {
   auto alive = session::SessionWriter::create(store.folder() / "recorded now",
                                               test::manifest_of({kUpkeptLayout}), small_disk_options());
   ASSERT_TRUE(alive);
@@ -176,7 +176,7 @@ TEST_F(Upkeep, ASessionThatSomebodyStillRecordsStaysAsItIs) {
   EXPECT_EQ(session::read_manifest(store.folder() / "recorded now")->state(), v1::Manifest::RECORDING);
 }
 
-TEST_F(Upkeep, EndedInMidSalvageTheNextStartGoesOnAndLosesNothing) {
+TEST_F(UpkeepThreads, EndedInMidSalvageTheNextStartGoesOnAndLosesNothing) {
   leave_killed_session(store.folder() / "killed");
   {
     Jobs jobs;

@@ -138,16 +138,16 @@ class DeskCamera final : public Camera {
   bool filming_ = false;
 };
 
-struct CameraThreadTest : ::testing::Test {
-  explicit CameraThreadTest(Seconds call_deadline = kHangGuard)
+struct CameraThreads : ::testing::Test {
+  explicit CameraThreads(Seconds call_deadline = kHangGuard)
       : camera(std::make_unique<CameraThread>(std::make_unique<DeskCamera>(desk), quick(call_deadline))) {}
   std::shared_ptr<Desk> desk = std::make_shared<Desk>();
   std::unique_ptr<CameraThread> camera;
 };
 
 /// A camera whose calls are soon late.
-struct HangingCameraTest : CameraThreadTest {
-  explicit HangingCameraTest(Seconds call_deadline = milliseconds(200)) : CameraThreadTest(call_deadline) {
+struct HangingCameraThreads : CameraThreads {
+  explicit HangingCameraThreads(Seconds call_deadline = milliseconds(200)) : CameraThreads(call_deadline) {
     start();
   }
   /// On a loaded machine the thread may be late itself.
@@ -155,11 +155,11 @@ struct HangingCameraTest : CameraThreadTest {
     ASSERT_TRUE(wait_until([&] { return camera->start().ok(); }));
   }
 };
-struct BusyCameraTest : HangingCameraTest {
-  BusyCameraTest() : HangingCameraTest(milliseconds(500)) {}
+struct BusyCameraThreads : HangingCameraThreads {
+  BusyCameraThreads() : HangingCameraThreads(milliseconds(500)) {}
 };
 
-TEST_F(CameraThreadTest, ARecordingThatEndsGivesItsFramesAndThenSaysSoEachTime) {
+TEST_F(CameraThreads, ARecordingThatEndsGivesItsFramesAndThenSaysSoEachTime) {
   desk->make_frames(3);
   desk->ended = true;
   ASSERT_TRUE(camera->start().ok());
@@ -173,7 +173,7 @@ TEST_F(CameraThreadTest, ARecordingThatEndsGivesItsFramesAndThenSaysSoEachTime) 
   EXPECT_EQ(camera->state(), State::idle);
 }
 
-TEST_F(CameraThreadTest, FramesComeInOrderAndAreCountedAsTheyAreTaken) {
+TEST_F(CameraThreads, FramesComeInOrderAndAreCountedAsTheyAreTaken) {
   ASSERT_TRUE(camera->start().ok());
   desk->make_frames(3);
   for (std::uint64_t id = 0; id < 3; ++id) EXPECT_EQ(camera->next_frame(kHangGuard)->stamp.frame_id, id);
@@ -183,7 +183,7 @@ TEST_F(CameraThreadTest, FramesComeInOrderAndAreCountedAsTheyAreTaken) {
   EXPECT_EQ(none.error().kind, ErrorKind::timed_out);
 }
 
-TEST_F(CameraThreadTest, AFullQueueLosesItsOldestAndCountsThem) {
+TEST_F(CameraThreads, AFullQueueLosesItsOldestAndCountsThem) {
   ASSERT_TRUE(camera->start().ok());
   desk->make_frames(10);
   ASSERT_TRUE(wait_until([&] { return camera->counts().queue == 6; }));
@@ -191,7 +191,7 @@ TEST_F(CameraThreadTest, AFullQueueLosesItsOldestAndCountsThem) {
   EXPECT_EQ(camera->counts(), (FrameCounts{.delivered = 4, .queue = 6}));
 }
 
-TEST_F(CameraThreadTest, ACameraThatWentAwayIsSaidOnceAndFilmsOnWhenItIsBack) {
+TEST_F(CameraThreads, ACameraThatWentAwayIsSaidOnceAndFilmsOnWhenItIsBack) {
   ASSERT_TRUE(camera->start().ok());
   desk->plugged = false;
   EXPECT_EQ(camera->next_frame(kHangGuard).error().kind, ErrorKind::device);
@@ -207,7 +207,7 @@ TEST_F(CameraThreadTest, ACameraThatWentAwayIsSaidOnceAndFilmsOnWhenItIsBack) {
   EXPECT_EQ(desk->starts, 2);
 }
 
-TEST_F(CameraThreadTest, StoppedWhileItIsAwayItIsNotLookedForAnyMore) {
+TEST_F(CameraThreads, StoppedWhileItIsAwayItIsNotLookedForAnyMore) {
   ASSERT_TRUE(camera->start().ok());
   desk->plugged = false;
   EXPECT_EQ(camera->next_frame(kHangGuard).error().kind, ErrorKind::device);
@@ -221,7 +221,7 @@ TEST_F(CameraThreadTest, StoppedWhileItIsAwayItIsNotLookedForAnyMore) {
   EXPECT_EQ(camera->state(), State::idle);
 }
 
-TEST_F(HangingCameraTest, OneThatHangsIsQuarantinedUntilItGoesOn) {
+TEST_F(HangingCameraThreads, OneThatHangsIsQuarantinedUntilItGoesOn) {
   desk->hang();
   const TimePoint began = SteadyClock().now();
   const auto hanging = camera->next_frame(2 * kHangGuard);
@@ -238,7 +238,7 @@ TEST_F(HangingCameraTest, OneThatHangsIsQuarantinedUntilItGoesOn) {
   EXPECT_TRUE(camera->next_frame(kHangGuard).ok());
 }
 
-TEST_F(BusyCameraTest, OneThatComputesForTooLongDoesNotHang) {
+TEST_F(BusyCameraThreads, OneThatComputesForTooLongDoesNotHang) {
   desk->computes = true;
   ASSERT_TRUE(wait_until([&] { return camera->overworked(); }));
   EXPECT_EQ(camera->state(), State::filming);
@@ -250,7 +250,7 @@ TEST_F(BusyCameraTest, OneThatComputesForTooLongDoesNotHang) {
   EXPECT_TRUE(camera->next_frame(kHangGuard).ok());
 }
 
-TEST_F(HangingCameraTest, OneThatHangsForGoodIsLeftBehindInBoundedTime) {
+TEST_F(HangingCameraThreads, OneThatHangsForGoodIsLeftBehindInBoundedTime) {
   desk->hang();
   EXPECT_FALSE(camera->next_frame(kHangGuard).ok());
   const TimePoint began = SteadyClock().now();
@@ -262,7 +262,7 @@ TEST_F(HangingCameraTest, OneThatHangsForGoodIsLeftBehindInBoundedTime) {
   ASSERT_TRUE(wait_until([&] { return desk->alive == 0; }));
 }
 
-TEST_F(CameraThreadTest, AResetReturnsBeforeItsInstantAndNoFrameOfTheOldPhaseIsHandedOn) {
+TEST_F(CameraThreads, AResetReturnsBeforeItsInstantAndNoFrameOfTheOldPhaseIsHandedOn) {
   ASSERT_TRUE(camera->start().ok());
   desk->make_frames(2);
   EXPECT_TRUE(camera->next_frame(kHangGuard).ok());
@@ -287,7 +287,7 @@ TEST_F(CameraThreadTest, AResetReturnsBeforeItsInstantAndNoFrameOfTheOldPhaseIsH
   EXPECT_GE(counts.passed_over, 4);
 }
 
-TEST_F(CameraThreadTest, OthersAreHeardWhileAResetWaitsForItsInstant) {
+TEST_F(CameraThreads, OthersAreHeardWhileAResetWaitsForItsInstant) {
   ASSERT_TRUE(camera->start().ok());
   ASSERT_TRUE(camera->reset_shutter(SteadyClock().now() + 2 * kHangGuard).ok());
   EXPECT_TRUE(camera->trim_rate(PartsPerMillion(7)).ok());
@@ -301,7 +301,7 @@ TEST_F(CameraThreadTest, OthersAreHeardWhileAResetWaitsForItsInstant) {
   EXPECT_EQ(desk->resets, 0);
 }
 
-TEST_F(CameraThreadTest, AResetThatFailsIsSaidOnceByTheNextFrame) {
+TEST_F(CameraThreads, AResetThatFailsIsSaidOnceByTheNextFrame) {
   ASSERT_TRUE(camera->start().ok());
   desk->refuses_resets = true;
   ASSERT_TRUE(camera->reset_shutter(SteadyClock().now()).ok());
@@ -310,14 +310,14 @@ TEST_F(CameraThreadTest, AResetThatFailsIsSaidOnceByTheNextFrame) {
   EXPECT_TRUE(next.ok() || next.error().kind == ErrorKind::timed_out) << next.error().message();
 }
 
-TEST_F(CameraThreadTest, WhatIsAwayCannotBeReset) {
+TEST_F(CameraThreads, WhatIsAwayCannotBeReset) {
   ASSERT_TRUE(camera->start().ok());
   desk->plugged = false;
   EXPECT_EQ(camera->next_frame(kHangGuard).error().kind, ErrorKind::device);
   EXPECT_EQ(camera->reset_shutter({}).error().kind, ErrorKind::timed_out);
 }
 
-TEST_F(HangingCameraTest, StoppedWhileItHangsItIsStoppedWhenItGoesOn) {
+TEST_F(HangingCameraThreads, StoppedWhileItHangsItIsStoppedWhenItGoesOn) {
   desk->hang();
   EXPECT_FALSE(camera->next_frame(kHangGuard).ok());
   camera->stop();
@@ -332,13 +332,13 @@ TEST_F(HangingCameraTest, StoppedWhileItHangsItIsStoppedWhenItGoesOn) {
   EXPECT_EQ(camera->counts().passed_over, 1);
 }
 
-TEST_F(CameraThreadTest, AShutterThatCannotBeResetIsRefusedAtOnce) {
+TEST_F(CameraThreads, AShutterThatCannotBeResetIsRefusedAtOnce) {
   CameraThread fixed(std::make_unique<DeskCamera>(desk, ShutterReset::none), quick());
   ASSERT_TRUE(fixed.start().ok());
   EXPECT_THAT(fixed.reset_shutter({}).error().message(), HasSubstr("can't be reset"));
 }
 
-TEST_F(CameraThreadTest, FramesPassedOverAreSaidAndCounted) {
+TEST_F(CameraThreads, FramesPassedOverAreSaidAndCounted) {
   ASSERT_TRUE(camera->start().ok());
   desk->make_frames(3);
   std::uint64_t passed = 0;
@@ -348,7 +348,7 @@ TEST_F(CameraThreadTest, FramesPassedOverAreSaidAndCounted) {
   EXPECT_EQ(camera->counts(), (FrameCounts{.delivered = 1, .passed_over = 3}));
 }
 
-TEST_F(CameraThreadTest, StopDropsWhatWaits) {
+TEST_F(CameraThreads, StopDropsWhatWaits) {
   ASSERT_TRUE(camera->start().ok());
   desk->make_frames(6);
   ASSERT_TRUE(wait_until([&] { return camera->counts().queue == 2; }));  // all six have come, four wait
@@ -361,12 +361,12 @@ TEST_F(CameraThreadTest, StopDropsWhatWaits) {
   EXPECT_EQ(camera->next_frame(kHangGuard)->stamp.frame_id, 6);
 }
 
-TEST_F(CameraThreadTest, TrimsReachTheCamera) {
+TEST_F(CameraThreads, TrimsReachTheCamera) {
   ASSERT_TRUE(camera->trim_rate(PartsPerMillion(12)).ok());
   EXPECT_EQ(desk->trimmed, 12);
 }
 
-TEST_F(CameraThreadTest, ACameraThatIsNotThereRefusesToStart) {
+TEST_F(CameraThreads, ACameraThatIsNotThereRefusesToStart) {
   desk->plugged = false;
   EXPECT_EQ(camera->start().error().kind, ErrorKind::device);
   EXPECT_EQ(camera->state(), State::idle);

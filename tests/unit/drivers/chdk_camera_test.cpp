@@ -76,7 +76,7 @@ struct Studio {
 int phase_shown(const Frame& frame) { return frame.image->view().sample(0, 0); }
 const CameraRequest kGray{.format = PixelFormat::gray8};
 
-TEST(ChdkCamera, FilmsItsLiveViewAtTheRateAskedFor) {
+TEST(ChdkCameraThreads, FilmsItsLiveViewAtTheRateAskedFor) {
   Studio studio;
   auto camera = studio.filming({.format = PixelFormat::gray8, .frame_rate = Hertz(20)});
   EXPECT_EQ(camera->info().id, "EMBER0001");
@@ -94,13 +94,13 @@ TEST(ChdkCamera, FilmsItsLiveViewAtTheRateAskedFor) {
   EXPECT_EQ(camera->counts().lost(), 0u);
 }
 
-TEST(ChdkCamera, ColourIsTheDefaultAndBrightnessOnRequest) {
+TEST(ChdkCameraThreads, ColourIsTheDefaultAndBrightnessOnRequest) {
   Studio studio;
   EXPECT_EQ((*studio.open())->info().layout.format, PixelFormat::rgb8);
   EXPECT_EQ((*studio.open(kGray))->info().layout.format, PixelFormat::gray8);
 }
 
-TEST(ChdkCamera, RequestsThatItCannotMeetSayWhatItCan) {
+TEST(ChdkCameraThreads, RequestsThatItCannotMeetSayWhatItCan) {
   Studio studio;
   const auto refusal = [&](CameraRequest request) {
     const auto camera = studio.open(request);
@@ -116,7 +116,7 @@ TEST(ChdkCamera, RequestsThatItCannotMeetSayWhatItCan) {
   EXPECT_THAT(refusal({.controls = {{"reset", "power"}}}), HasSubstr("power_command"));
 }
 
-TEST(ChdkCamera, ACameraOfAnotherMakerIsNeverAskedForChdk) {
+TEST(ChdkCameraThreads, ACameraOfAnotherMakerIsNeverAskedForChdk) {
   Studio studio({.usb_vendor = 0x04b0});
   const auto camera = studio.open();
   ASSERT_FALSE(camera.ok());
@@ -124,12 +124,12 @@ TEST(ChdkCamera, ACameraOfAnotherMakerIsNeverAskedForChdk) {
   EXPECT_EQ(studio.device().transactions(), 3);  // open, device info, close
 }
 
-TEST(ChdkCamera, ACanonWithoutChdkSaysSo) {
+TEST(ChdkCameraThreads, ACanonWithoutChdkSaysSo) {
   Studio studio({.chdk = false});
   EXPECT_THAT(studio.open().error().message(), HasSubstr("doesn't run CHDK"));
 }
 
-TEST(ChdkCamera, ACameraThatStaysInPlaybackIsRefusedInBoundedTime) {
+TEST(ChdkCameraThreads, ACameraThatStaysInPlaybackIsRefusedInBoundedTime) {
   Studio studio({.mode_change = Seconds(60)});
   const TimePoint begin = studio.clock->now();
   EXPECT_FALSE(studio.open().ok());
@@ -141,12 +141,12 @@ struct ResetCase {
   int draws;  // of the phase, until frames come again
   double shortest, longest;
 };
-class ChdkCameraReset : public testing::TestWithParam<ResetCase> {};
-INSTANTIATE_TEST_SUITE_P(Actions, ChdkCameraReset,
+class ChdkCameraResetThreads : public testing::TestWithParam<ResetCase> {};
+INSTANTIATE_TEST_SUITE_P(Actions, ChdkCameraResetThreads,
                          testing::Values(ResetCase{"mode", 1, 0.5, 0.8}, ResetCase{"movie", 1, 0.4, 0.6}),
                          [](const auto& shown) { return shown.param.control; });
 
-TEST_P(ChdkCameraReset, ShowsTheNewPhaseInTheNextFrameAndSaysHowLongItTook) {
+TEST_P(ChdkCameraResetThreads, ShowsTheNewPhaseInTheNextFrameAndSaysHowLongItTook) {
   Studio studio;
   auto camera = studio.filming({.format = PixelFormat::gray8, .controls = {{"reset", GetParam().control}}});
   for (int i = 0; i < 10; ++i) {
@@ -167,7 +167,7 @@ TEST_P(ChdkCameraReset, ShowsTheNewPhaseInTheNextFrameAndSaysHowLongItTook) {
   EXPECT_EQ(camera->counts().lost(), 0u);
 }
 
-TEST(ChdkCamera, AResetAtAnInstantBeginsThenAndTheNextFrameShowsTheNewPhase) {
+TEST(ChdkCameraThreads, AResetAtAnInstantBeginsThenAndTheNextFrameShowsTheNewPhase) {
   Studio studio;
   auto camera = studio.filming(kGray);
   ASSERT_TRUE(studio.frame(*camera, Seconds(1)).ok());
@@ -178,7 +178,7 @@ TEST(ChdkCamera, AResetAtAnInstantBeginsThenAndTheNextFrameShowsTheNewPhase) {
   EXPECT_NEAR((camera->last_reset()->at - at).value(), 0, 1e-3);
 }
 
-TEST(ChdkCamera, AResetDuringAMovieLeavesAMovieRunning) {
+TEST(ChdkCameraThreads, AResetDuringAMovieLeavesAMovieRunning) {
   Studio studio;
   auto camera = studio.filming({.format = PixelFormat::gray8, .controls = {{"reset", "movie"}}});
   Chdk chdk(*camera->session());
@@ -191,7 +191,7 @@ TEST(ChdkCamera, AResetDuringAMovieLeavesAMovieRunning) {
   EXPECT_EQ(studio.device().objects().size(), 1u);
 }
 
-TEST(ChdkCamera, APowerCycleByTheUsersCommandIsSeenThrough) {
+TEST(ChdkCameraThreads, APowerCycleByTheUsersCommandIsSeenThrough) {
   Studio studio;
   const test::TempFolder folder;
   const auto note = folder / "note";
@@ -218,7 +218,7 @@ TEST(ChdkCamera, APowerCycleByTheUsersCommandIsSeenThrough) {
   EXPECT_EQ(phase_shown(*frame), studio.device().phase_draws());
 }
 
-TEST(ChdkCamera, APowerCommandThatFailsIsAnError) {
+TEST(ChdkCameraThreads, APowerCommandThatFailsIsAnError) {
   Studio studio;
   auto camera = studio.filming({.controls = {{"reset", "power"}, {"power_command", "exit 3"}}});
   Status said = camera->reset_shutter(studio.clock->now());
@@ -231,7 +231,7 @@ TEST(ChdkCamera, APowerCommandThatFailsIsAnError) {
   EXPECT_THAT(said.error().message(), HasSubstr("power command failed"));
 }
 
-TEST(ChdkCamera, UnpluggedItSaysSoOnceAndStartFindsItAgain) {
+TEST(ChdkCameraThreads, UnpluggedItSaysSoOnceAndStartFindsItAgain) {
   Studio studio;
   auto camera = studio.filming(kGray);
   ASSERT_TRUE(studio.frame(*camera, Seconds(1)).ok());
@@ -248,7 +248,7 @@ TEST(ChdkCamera, UnpluggedItSaysSoOnceAndStartFindsItAgain) {
   EXPECT_TRUE(studio.frame(*camera, Seconds(3)).ok());
 }
 
-TEST(ChdkCamera, UnpluggedInTheMiddleOfAResetItSaysSoToo) {
+TEST(ChdkCameraThreads, UnpluggedInTheMiddleOfAResetItSaysSoToo) {
   Studio studio;
   auto camera = studio.filming(kGray);
   ASSERT_TRUE(studio.frame(*camera, Seconds(1)).ok());
@@ -260,7 +260,7 @@ TEST(ChdkCamera, UnpluggedInTheMiddleOfAResetItSaysSoToo) {
   EXPECT_TRUE(studio.frame(*camera, Seconds(3)).ok());
 }
 
-TEST(ChdkCamera, ACameraThatHangsIsGivenUpAndNoCallOutlastsItsDeadlineByTwoSeconds) {
+TEST(ChdkCameraThreads, ACameraThatHangsIsGivenUpAndNoCallOutlastsItsDeadlineByTwoSeconds) {
   Studio studio;
   auto camera = studio.filming(kGray);
   ASSERT_TRUE(studio.frame(*camera, Seconds(1)).ok());
@@ -278,7 +278,7 @@ TEST(ChdkCamera, ACameraThatHangsIsGivenUpAndNoCallOutlastsItsDeadlineByTwoSecon
   EXPECT_LE((studio.clock->now() - begin).value(), 4.0);
 }
 
-TEST(ChdkCamera, ALateLiveViewFilmsSlowerAndLosesNothing) {
+TEST(ChdkCameraThreads, ALateLiveViewFilmsSlowerAndLosesNothing) {
   Studio studio;
   auto camera = studio.filming(kGray);
   studio.device().faults.latency = milliseconds(110);
@@ -294,8 +294,8 @@ struct Malformed {
   const char* name;
   int Faults::*fault;
 };
-class ChdkCameraMalformed : public testing::TestWithParam<Malformed> {};
-INSTANTIATE_TEST_SUITE_P(Answers, ChdkCameraMalformed,
+class ChdkCameraMalformedThreads : public testing::TestWithParam<Malformed> {};
+INSTANTIATE_TEST_SUITE_P(Answers, ChdkCameraMalformedThreads,
                          testing::Values(Malformed{"WrongTransaction", &Faults::wrong_transaction},
                                          Malformed{"LongLength", &Faults::long_length},
                                          Malformed{"ShortLength", &Faults::short_length},
@@ -304,7 +304,7 @@ INSTANTIATE_TEST_SUITE_P(Answers, ChdkCameraMalformed,
                                          Malformed{"BadLiveView", &Faults::bad_live_view}),
                          [](const auto& shown) { return shown.param.name; });
 
-TEST_P(ChdkCameraMalformed, CostsOneFrameWhichIsCountedAndNeverHandedOn) {
+TEST_P(ChdkCameraMalformedThreads, CostsOneFrameWhichIsCountedAndNeverHandedOn) {
   Studio studio;
   auto camera = studio.filming(kGray);
   std::uint64_t next = 0;
@@ -320,7 +320,7 @@ TEST_P(ChdkCameraMalformed, CostsOneFrameWhichIsCountedAndNeverHandedOn) {
   EXPECT_EQ(camera->counts().delivered + camera->counts().lost(), next);
 }
 
-TEST_P(ChdkCameraMalformed, ForEverIsALostCamera) {
+TEST_P(ChdkCameraMalformedThreads, ForEverIsALostCamera) {
   Studio studio;
   auto camera = studio.filming(kGray);
   studio.device().faults.*GetParam().fault = -1;
@@ -334,7 +334,7 @@ TEST_P(ChdkCameraMalformed, ForEverIsALostCamera) {
   EXPECT_EQ(frame.error().kind, ErrorKind::device);
 }
 
-TEST(ChdkCamera, StoppedItDropsWhatIsUnderWayAndFilmsAgain) {
+TEST(ChdkCameraThreads, StoppedItDropsWhatIsUnderWayAndFilmsAgain) {
   Studio studio;
   auto camera = studio.filming(kGray);
   studio.device().faults.latency = milliseconds(60);

@@ -14,7 +14,7 @@ namespace {
 
 TimePoint after(double seconds) { return TimePoint{} + Seconds(seconds); }
 
-TEST(Crystal, WandersWithinAnHourByWhatItIsToldInTheMean) {
+TEST(CrystalThreads, WandersWithinAnHourByWhatItIsToldInTheMean) {
   double squared = 0;
   constexpr int kCrystals = 2000;
   for (std::uint64_t seed = 0; seed < kCrystals; ++seed) {
@@ -25,7 +25,7 @@ TEST(Crystal, WandersWithinAnHourByWhatItIsToldInTheMean) {
   EXPECT_NEAR(std::sqrt(squared), 2, 0.1);
 }
 
-TEST(Crystal, GoesAheadByTheIntegralOfItsRate) {
+TEST(CrystalThreads, GoesAheadByTheIntegralOfItsRate) {
   const Crystal crystal(PartsPerMillion(3), 7);
   double sum = 0;
   for (int s = 0; s < 4000; ++s) sum += crystal.rate(after(s + 0.5)).value();
@@ -33,7 +33,7 @@ TEST(Crystal, GoesAheadByTheIntegralOfItsRate) {
   EXPECT_EQ(Crystal(PartsPerMillion(0), 7).ahead(after(4000)), Seconds(0));
 }
 
-TEST(Crystal, TimesTheFramesOfItsCamera) {
+TEST(CrystalThreads, TimesTheFramesOfItsCamera) {
   const auto start_after = [](PartsPerMillion wander, double seconds) {
     VirtualRigDraw draw;
     draw.cameras = 1;

@@ -18,7 +18,7 @@ using testing::HasSubstr;
 
 constexpr auto kFlashingByHand = StrobeOutput::flashing;
 
-TEST(ManualStrobe, NotesWhatSomebodyIsToSetToTheDialsSteps) {
+TEST(ManualStrobeThreads, NotesWhatSomebodyIsToSetToTheDialsSteps) {
   ManualStrobe strobe("lab strobe");
   ASSERT_TRUE(strobe.apply({.output = kFlashingByHand, .rate = Hertz(24000.0 / 1001)}).ok());
   EXPECT_NEAR(60 * strobe.read_back().value().rate.value(), 1438.6, 1e-9);
@@ -29,7 +29,7 @@ TEST(ManualStrobe, NotesWhatSomebodyIsToSetToTheDialsSteps) {
   EXPECT_EQ(coarse.dial()->per_minute(coarse.read_back().value().rate), "1439");
 }
 
-TEST(ManualStrobe, RefusesWhatNoDialDoes) {
+TEST(ManualStrobeThreads, RefusesWhatNoDialDoes) {
   ManualStrobe strobe("lab strobe");
   for (const StrobeSettings& settings :
        {StrobeSettings{.output = StrobeOutput::off}, StrobeSettings{.output = StrobeOutput::steady},

@@ -39,7 +39,7 @@ ProbeFilm even_film(const std::vector<std::uint64_t>& lost = {}) {
   return film;
 }
 
-TEST(Probe, AnEvenCameraIsGoodAndItsRateExact) {
+TEST(ProbeThreads, AnEvenCameraIsGoodAndItsRateExact) {
   const ProbeVerdict verdict = assess(even_film(), {});
   EXPECT_EQ(verdict.fitness, Fitness::good);
   EXPECT_NEAR(verdict.rate.value(), 25, 1e-9);
@@ -47,7 +47,7 @@ TEST(Probe, AnEvenCameraIsGoodAndItsRateExact) {
   EXPECT_THAT(finding(verdict, "bandwidth").measured, HasSubstr("isn't known"));
 }
 
-TEST(Probe, LostFramesAreSaidByCauseAndDoNotBendTheRate) {
+TEST(ProbeThreads, LostFramesAreSaidByCauseAndDoNotBendTheRate) {
   const ProbeVerdict few = assess(even_film({50}), {});
   EXPECT_NEAR(few.rate.value(), 25, 1e-9);
   EXPECT_EQ(few.fitness, Fitness::poor);
@@ -56,7 +56,7 @@ TEST(Probe, LostFramesAreSaidByCauseAndDoNotBendTheRate) {
   EXPECT_EQ(assess(even_film({10, 11, 12, 13}), {}).fitness, Fitness::unfit);
 }
 
-TEST(Probe, ACameraThatKeepsAnotherRateThanItSaysIsPoor) {
+TEST(ProbeThreads, ACameraThatKeepsAnotherRateThanItSaysIsPoor) {
   ProbeFilm film = even_film();
   film.info.frame_rate = Hertz(30);
   const ProbeVerdict verdict = assess(film, {});
@@ -64,7 +64,7 @@ TEST(Probe, ACameraThatKeepsAnotherRateThanItSaysIsPoor) {
   EXPECT_THAT(finding(verdict, "rate").measured, HasSubstr("25.0000 frames/s"));
 }
 
-TEST(Probe, UnevenArrivalCountsWhereFramesCouldBeMistaken) {
+TEST(ProbeThreads, UnevenArrivalCountsWhereFramesCouldBeMistaken) {
   ProbeFilm film = even_film();
   for (std::size_t i = 0; i < film.stamps.size(); i += 2) {
     film.stamps[i].monotonic_time = film.stamps[i].monotonic_time + milliseconds(3);
@@ -75,7 +75,7 @@ TEST(Probe, UnevenArrivalCountsWhereFramesCouldBeMistaken) {
   EXPECT_EQ(finding(assess(film, {}), "arrival").fitness, Fitness::poor);
 }
 
-TEST(Probe, TheCamerasOwnClockIsBelievedWhereItSaysWhatItMarks) {
+TEST(ProbeThreads, TheCamerasOwnClockIsBelievedWhereItSaysWhatItMarks) {
   ProbeFilm film = even_film();
   film.info.device_time_of = DeviceTimeOf::exposure_start;
   for (FrameStamp& stamp : film.stamps) {
@@ -84,13 +84,13 @@ TEST(Probe, TheCamerasOwnClockIsBelievedWhereItSaysWhatItMarks) {
   EXPECT_NEAR(assess(film, {}).rate.value(), 1000 / 39.999, 1e-6);
 }
 
-TEST(Probe, AFullLinkIsPoor) {
+TEST(ProbeThreads, AFullLinkIsPoor) {
   EXPECT_EQ(finding(assess(even_film(), 480.), "bandwidth").fitness, Fitness::good);
   EXPECT_THAT(finding(assess(even_film(), 480.), "bandwidth").measured, HasSubstr("87 % left"));
   EXPECT_EQ(finding(assess(even_film(), 65.), "bandwidth").fitness, Fitness::poor);
 }
 
-TEST(Probe, ACameraThatFailsMeanwhileIsUnfitAndItsErrorIsSaid) {
+TEST(ProbeThreads, ACameraThatFailsMeanwhileIsUnfitAndItsErrorIsSaid) {
   ProbeFilm film = even_film();
   film.failed = Error{ErrorKind::device, "it was unplugged", "camera c7", "plug it in"};
   EXPECT_EQ(assess(film, {}).fitness, Fitness::unfit);
@@ -98,7 +98,7 @@ TEST(Probe, ACameraThatFailsMeanwhileIsUnfitAndItsErrorIsSaid) {
   EXPECT_EQ(assess({}, {}).fitness, Fitness::unfit);
 }
 
-TEST(Probe, AVirtualCameraShowsItsTrueRateAndResetDelay) {
+TEST(ProbeThreads, AVirtualCameraShowsItsTrueRateAndResetDelay) {
   VirtualCameraOptions camera = testing_support::small_camera();
   camera.timing.frame_period = Seconds(1 / (24 * (1 + 150e-6)));
   camera.reset_latency = milliseconds(180);
@@ -118,7 +118,7 @@ TEST(Probe, AVirtualCameraShowsItsTrueRateAndResetDelay) {
   EXPECT_NEAR(in_milliseconds(verdict.reset->sigma), 2, .5);
 }
 
-TEST(Probe, AResetThatIsRefusedEndsTheFilmAndIsSaid) {
+TEST(ProbeThreads, AResetThatIsRefusedEndsTheFilmAndIsSaid) {
   const auto rig = testing_support::small_rig({testing_support::small_camera()}, {});
   rig->set_reset(ShutterReset::none);
   const ProbeFilm film =

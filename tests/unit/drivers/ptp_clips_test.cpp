@@ -24,7 +24,7 @@ using chdk_responder::FakeTransport;
 using chdk_responder::OpenBench;
 using testing::HasSubstr;
 
-class PtpClips : public testing::Test {
+class PtpClipsThreads : public testing::Test {
  protected:
   [[nodiscard]] fs::path target() const { return folder_ / "MVI_0001.AVI"; }
   [[nodiscard]] fs::path part() const { return folder_ / "MVI_0001.AVI.part"; }
@@ -57,7 +57,7 @@ class PtpClips : public testing::Test {
   test::TempFolder folder_;
 };
 
-TEST_F(PtpClips, ListsMoviesOfAllFoldersByNameAndNothingElse) {
+TEST_F(PtpClipsThreads, ListsMoviesOfAllFoldersByNameAndNothingElse) {
   const std::uint32_t dcim = bench_.device().add_object({"DCIM", 0x3001, 0, 0});
   const std::uint32_t canon = bench_.device().add_object({"100CANON", 0x3001, 0, dcim});
   bench_.device().add_object({"MVI_0003.MOV", 0x300d, 1000, canon});
@@ -74,7 +74,7 @@ TEST_F(PtpClips, ListsMoviesOfAllFoldersByNameAndNothingElse) {
   EXPECT_EQ(clips->at(1).captured, "20261121T220000");
 }
 
-TEST_F(PtpClips, AMovieIsStartedEndedAndThenOnTheCard) {
+TEST_F(PtpClipsThreads, AMovieIsStartedEndedAndThenOnTheCard) {
   bench_.record();
   ASSERT_TRUE(start_movie(bench_.chdk, *bench_.clock).ok());
   EXPECT_THAT(start_movie(bench_.chdk, *bench_.clock).error().message(), HasSubstr("already"));
@@ -86,7 +86,7 @@ TEST_F(PtpClips, AMovieIsStartedEndedAndThenOnTheCard) {
   EXPECT_NEAR(clips.at(1).bytes, 2'250'000, 100'000);
 }
 
-TEST_F(PtpClips, AMovieThatDoesNotStartIsGivenUpAtTheDeadline) {
+TEST_F(PtpClipsThreads, AMovieThatDoesNotStartIsGivenUpAtTheDeadline) {
   const TimePoint begin = bench_.clock->now();  // in playback mode
   const Status started = start_movie(bench_.chdk, *bench_.clock, Seconds(1));
   ASSERT_FALSE(started.ok());
@@ -94,7 +94,7 @@ TEST_F(PtpClips, AMovieThatDoesNotStartIsGivenUpAtTheDeadline) {
   EXPECT_LE((bench_.clock->now() - begin).value(), 1.2);
 }
 
-TEST_F(PtpClips, ADownloadIsTheClipByteForByteWithItsChecksumBeside) {
+TEST_F(PtpClipsThreads, ADownloadIsTheClipByteForByteWithItsChecksumBeside) {
   const Status done = download_clip(bench_.session, clip(), target());
   ASSERT_TRUE(done.ok()) << done.error().message();
   EXPECT_EQ(read_file(target()).value(), expected());
@@ -105,7 +105,7 @@ TEST_F(PtpClips, ADownloadIsTheClipByteForByteWithItsChecksumBeside) {
   EXPECT_EQ(bench_.device().objects().size(), 1u);
 }
 
-TEST_F(PtpClips, AByteThatChangedLaterIsFound) {
+TEST_F(PtpClipsThreads, AByteThatChangedLaterIsFound) {
   ASSERT_TRUE(download_clip(bench_.session, clip(), target()).ok());
   std::string content = expected();
   content[2'000'000] ^= 1;
@@ -113,7 +113,7 @@ TEST_F(PtpClips, AByteThatChangedLaterIsFound) {
   EXPECT_FALSE(verify_clip(target()).ok());
 }
 
-TEST_F(PtpClips, UnpluggedInTheMiddleItGoesOnFromThere) {
+TEST_F(PtpClipsThreads, UnpluggedInTheMiddleItGoesOnFromThere) {
   EXPECT_FALSE(download_until(0.5).ok());
   EXPECT_FALSE(fs::exists(target()));
   const std::uintmax_t kept = fs::file_size(part());
@@ -126,7 +126,7 @@ TEST_F(PtpClips, UnpluggedInTheMiddleItGoesOnFromThere) {
   EXPECT_NEAR(progress.front(), static_cast<double>(kept) / kBytes, 1e-9);
 }
 
-TEST_F(PtpClips, WhatIsThereOfAnotherClipIsNotGoneOnWith) {
+TEST_F(PtpClipsThreads, WhatIsThereOfAnotherClipIsNotGoneOnWith) {
   ASSERT_TRUE(write_file_atomically(part(), std::string(2'000'000, 'x')).ok());
   std::vector<double> progress;
   ASSERT_TRUE(download_again(&progress).ok());
@@ -134,19 +134,19 @@ TEST_F(PtpClips, WhatIsThereOfAnotherClipIsNotGoneOnWith) {
   EXPECT_EQ(read_file(target()).value(), expected());
 }
 
-TEST_F(PtpClips, MoreThanThereIsOfTheClipIsNotGoneOnWith) {
+TEST_F(PtpClipsThreads, MoreThanThereIsOfTheClipIsNotGoneOnWith) {
   ASSERT_TRUE(write_file_atomically(part(), expected() + "more").ok());
   ASSERT_TRUE(download_again().ok());
   EXPECT_EQ(read_file(target()).value(), expected());
 }
 
-TEST_F(PtpClips, AllOfItThereOnlyNeedsItsName) {
+TEST_F(PtpClipsThreads, AllOfItThereOnlyNeedsItsName) {
   ASSERT_TRUE(write_file_atomically(part(), expected()).ok());
   ASSERT_TRUE(download_again().ok());
   EXPECT_TRUE(verify_clip(target()).ok());
 }
 
-TEST_F(PtpClips, AFileThatIsThereAlreadyIsNotTouched) {
+TEST_F(PtpClipsThreads, AFileThatIsThereAlreadyIsNotTouched) {
   ASSERT_TRUE(write_file_atomically(target(), "mine").ok());
   const Status refused = download_clip(bench_.session, clip(), target());
   ASSERT_FALSE(refused.ok());
@@ -154,7 +154,7 @@ TEST_F(PtpClips, AFileThatIsThereAlreadyIsNotTouched) {
   EXPECT_EQ(read_file(target()).value(), "mine");
 }
 
-TEST_F(PtpClips, AFolderThatIsMissingIsMadeAndOneThatCannotBeIsNamed) {
+TEST_F(PtpClipsThreads, AFolderThatIsMissingIsMadeAndOneThatCannotBeIsNamed) {
   EXPECT_TRUE(download_clip(bench_.session, clip(), folder_ / "new" / "A.AVI").ok());
   ASSERT_TRUE(write_file_atomically(folder_ / "file", "no folder").ok());
   const Status refused = download_clip(bench_.session, clip(), folder_ / "file" / "A.AVI");
@@ -163,7 +163,7 @@ TEST_F(PtpClips, AFolderThatIsMissingIsMadeAndOneThatCannotBeIsNamed) {
   EXPECT_THAT(refused.error().message(), HasSubstr("file"));
 }
 
-TEST_F(PtpClips, ACameraThatCannotSendPartsSendsTheWhole) {
+TEST_F(PtpClipsThreads, ACameraThatCannotSendPartsSendsTheWhole) {
   OpenBench old({.partial_objects = false});
   const std::uint32_t handle = old.device().add_object({"MVI_0001.AVI", 0x300a, 700'000, 0});
   ASSERT_TRUE(write_file_atomically(part(), "left from before").ok());

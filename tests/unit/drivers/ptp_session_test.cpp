@@ -32,7 +32,7 @@ std::vector<std::byte> object(Bench& bench, std::uint32_t handle, std::uint32_t 
   return content;
 }
 
-TEST(PtpSession, ACameraSaysWhatItIs) {
+TEST(PtpSessionThreads, ACameraSaysWhatItIs) {
   OpenBench bench;
   const auto info = bench.session.device_info();
   ASSERT_TRUE(info.ok()) << info.error().message();
@@ -43,7 +43,7 @@ TEST(PtpSession, ACameraSaysWhatItIs) {
   EXPECT_THAT(info->operations, testing::Contains(0x9999));
 }
 
-TEST(PtpSession, FilesOfEverySizeAroundAPacketComeAsTheyAre) {
+TEST(PtpSessionThreads, FilesOfEverySizeAroundAPacketComeAsTheyAre) {
   for (const bool empty_packets : {true, false}) {
     Bench bench;
     bench.device().faults.no_empty_packet = empty_packets ? 0 : -1;
@@ -58,14 +58,14 @@ TEST(PtpSession, FilesOfEverySizeAroundAPacketComeAsTheyAre) {
   }
 }
 
-TEST(PtpSession, AHeaderInATransferOfItsOwnIsAllowed) {
+TEST(PtpSessionThreads, AHeaderInATransferOfItsOwnIsAllowed) {
   OpenBench bench;
   bench.device().faults.header_alone = -1;
   const std::uint32_t handle = bench.device().add_object({"A.AVI", 0x300a, 3000, 0});
   EXPECT_EQ(object(bench, handle, 3000), bench.device().content(handle, 0, 3000));
 }
 
-TEST(PtpSession, ASessionLeftOpenByAProgramThatDiedIsClosedFirst) {
+TEST(PtpSessionThreads, ASessionLeftOpenByAProgramThatDiedIsClosedFirst) {
   Bench bench;
   {
     FakeTransport dead(bench.cable);
@@ -76,7 +76,7 @@ TEST(PtpSession, ASessionLeftOpenByAProgramThatDiedIsClosedFirst) {
   EXPECT_TRUE(bench.session.storages().ok());
 }
 
-TEST(PtpSession, APartOfAFileComesFromItsOffset) {
+TEST(PtpSessionThreads, APartOfAFileComesFromItsOffset) {
   OpenBench bench;
   const std::uint32_t handle = bench.device().add_object({"A.AVI", 0x300a, 10'000, 0});
   std::vector<std::byte> content;
@@ -91,7 +91,7 @@ TEST(PtpSession, APartOfAFileComesFromItsOffset) {
   EXPECT_EQ(content, bench.device().content(handle, 9'000, 1000));
 }
 
-TEST(PtpSession, ABusyCameraIsAskedAgain) {
+TEST(PtpSessionThreads, ABusyCameraIsAskedAgain) {
   OpenBench bench;
   bench.device().faults.busy = 5;
   EXPECT_TRUE(bench.session.storages().ok());
@@ -102,7 +102,7 @@ TEST(PtpSession, ABusyCameraIsAskedAgain) {
   EXPECT_THAT(refused.error().message(), HasSubstr("camera E1"));
 }
 
-TEST(PtpSession, ARefusalIsToldInWordsAndTheSessionGoesOn) {
+TEST(PtpSessionThreads, ARefusalIsToldInWordsAndTheSessionGoesOn) {
   OpenBench bench;
   const auto info = bench.session.object_info(99);
   ASSERT_FALSE(info.ok());
@@ -111,7 +111,7 @@ TEST(PtpSession, ARefusalIsToldInWordsAndTheSessionGoesOn) {
   EXPECT_EQ(bench.cable->recoveries, 0);
 }
 
-TEST(PtpSession, AHangingCameraIsGivenUpAtTheDeadlineAndRecoveredByTheNextQuestion) {
+TEST(PtpSessionThreads, AHangingCameraIsGivenUpAtTheDeadlineAndRecoveredByTheNextQuestion) {
   OpenBench bench;
   bench.device().faults.hang = 1;
   const Seconds before = bench.elapsed();
@@ -123,7 +123,7 @@ TEST(PtpSession, AHangingCameraIsGivenUpAtTheDeadlineAndRecoveredByTheNextQuesti
   EXPECT_EQ(bench.cable->recoveries, 1);
 }
 
-TEST(PtpSession, ACameraThatHangsForGoodIsLeftInBoundedTime) {
+TEST(PtpSessionThreads, ACameraThatHangsForGoodIsLeftInBoundedTime) {
   OpenBench bench;
   bench.device().faults.hang = -1;
   const Seconds before = bench.elapsed();
@@ -131,7 +131,7 @@ TEST(PtpSession, ACameraThatHangsForGoodIsLeftInBoundedTime) {
   EXPECT_LE((bench.elapsed() - before).value(), 1.0 + 1e-6);
 }
 
-TEST(PtpSession, ALateAnswerMayBeWaitedForInParts) {
+TEST(PtpSessionThreads, ALateAnswerMayBeWaitedForInParts) {
   OpenBench bench;
   bench.device().faults.latency = milliseconds(95);
   ASSERT_TRUE(bench.session.begin({0x1004}).ok());
@@ -151,9 +151,9 @@ struct MalformedAnswer {
   int Faults::*fault;
   const char* words;
 };
-class PtpSessionMalformed : public testing::TestWithParam<MalformedAnswer> {};
+class PtpSessionMalformedThreads : public testing::TestWithParam<MalformedAnswer> {};
 INSTANTIATE_TEST_SUITE_P(
-    Answers, PtpSessionMalformed,
+    Answers, PtpSessionMalformedThreads,
     testing::Values(MalformedAnswer{"WrongTransaction", &Faults::wrong_transaction, "transaction"},
                     MalformedAnswer{"MoreAnnouncedThanComes", &Faults::long_length, "too soon"},
                     MalformedAnswer{"LessAnnouncedThanComes", &Faults::short_length, "more data"},
@@ -161,7 +161,7 @@ INSTANTIATE_TEST_SUITE_P(
                     MalformedAnswer{"Stall", &Faults::stall, ""}),
     [](const auto& shown) { return shown.param.name; });
 
-TEST_P(PtpSessionMalformed, IsAnErrorAndTheNextQuestionIsAnswered) {
+TEST_P(PtpSessionMalformedThreads, IsAnErrorAndTheNextQuestionIsAnswered) {
   OpenBench bench;
   const std::uint32_t handle = bench.device().add_object({"A.AVI", 0x300a, 5000, 0});
   bench.device().faults.*GetParam().fault = 1;
@@ -174,14 +174,14 @@ TEST_P(PtpSessionMalformed, IsAnErrorAndTheNextQuestionIsAnswered) {
   EXPECT_EQ(bench.cable->recoveries, 1);
 }
 
-TEST_P(PtpSessionMalformed, ForEverEndsInAnErrorEachTime) {
+TEST_P(PtpSessionMalformedThreads, ForEverEndsInAnErrorEachTime) {
   Bench bench;
   bench.device().faults.*GetParam().fault = -1;
   (void)bench.session.open();
   for (int i = 0; i < 5; ++i) EXPECT_FALSE(bench.session.device_info().ok());
 }
 
-TEST(PtpSession, AnUnpluggedCameraIsAnErrorAtOnce) {
+TEST(PtpSessionThreads, AnUnpluggedCameraIsAnErrorAtOnce) {
   OpenBench bench;
   bench.cable->plugged = false;
   const auto gone = bench.session.storages();
@@ -190,7 +190,7 @@ TEST(PtpSession, AnUnpluggedCameraIsAnErrorAtOnce) {
   bench.session.close();
 }
 
-TEST(PtpSession, DataBeyondWhatWasAskedForAreRefusedBeforeTheyAreRead) {
+TEST(PtpSessionThreads, DataBeyondWhatWasAskedForAreRefusedBeforeTheyAreRead) {
   OpenBench bench;
   const std::uint32_t handle = bench.device().add_object({"A.AVI", 0x300a, 5000, 0});
   EXPECT_FALSE(bench.session.transact({0x1009, {handle}, {}, {}, 4999}).ok());

@@ -58,7 +58,7 @@ void record_run(const std::filesystem::path& folder) {
   ASSERT_TRUE(writer->finish());
 }
 
-class Replay : public testing::Test {
+class ReplayThreads : public testing::Test {
  protected:
   void SetUp() override {
     record_run(temp_ / "s");
@@ -82,7 +82,7 @@ class Replay : public testing::Test {
   ReplayRig rig_;
 };
 
-TEST_F(Replay, CamerasAreDescribedAsTheyWereRecorded) {
+TEST_F(ReplayThreads, CamerasAreDescribedAsTheyWereRecorded) {
   const CameraInfo& info = rig_.cameras.at(1)->info();
   EXPECT_EQ(info.id, "right");
   EXPECT_EQ(info.model, "a model");
@@ -95,7 +95,7 @@ TEST_F(Replay, CamerasAreDescribedAsTheyWereRecorded) {
   EXPECT_EQ(info.trim->step, PartsPerMillion(0.5));
 }
 
-TEST_F(Replay, TheRecordedCourseComesBackWithTheInstantsThatTheLiveRunSaw) {
+TEST_F(ReplayThreads, TheRecordedCourseComesBackWithTheInstantsThatTheLiveRunSaw) {
   ASSERT_TRUE(rig_.strobe->apply(flashing(1)));
   const auto state = rig_.strobe->read_back();
   ASSERT_TRUE(state);
@@ -118,14 +118,14 @@ TEST_F(Replay, TheRecordedCourseComesBackWithTheInstantsThatTheLiveRunSaw) {
   EXPECT_EQ(end.error().kind, ErrorKind::out_of_data);
 }
 
-TEST_F(Replay, AResetThatWasNotRecordedIsADeviceError) {
+TEST_F(ReplayThreads, AResetThatWasNotRecordedIsADeviceError) {
   ASSERT_TRUE(rig_.cameras[0]->reset_shutter({1'021'000'000}));
   const Status again = rig_.cameras[0]->reset_shutter({1'021'000'000});
   ASSERT_FALSE(again);
   EXPECT_EQ(again.error().kind, ErrorKind::device);
 }
 
-TEST_F(Replay, AResetForAnotherInstantIsADeviceErrorThatSaysBoth) {
+TEST_F(ReplayThreads, AResetForAnotherInstantIsADeviceErrorThatSaysBoth) {
   const Status status = rig_.cameras[0]->reset_shutter({1'021'000'001});
   ASSERT_FALSE(status);
   EXPECT_EQ(status.error().kind, ErrorKind::device);
@@ -133,7 +133,7 @@ TEST_F(Replay, AResetForAnotherInstantIsADeviceErrorThatSaysBoth) {
   EXPECT_NE(status.error().message().find("1021000001"), std::string::npos);
 }
 
-TEST_F(Replay, ATrimThatWasRecordedOtherwiseIsADeviceError) {
+TEST_F(ReplayThreads, ATrimThatWasRecordedOtherwiseIsADeviceError) {
   EXPECT_EQ(rig_.cameras[0]->trim_rate(PartsPerMillion(-12.5)).error().kind,
             ErrorKind::device);  // a reset is due
   ASSERT_TRUE(rig_.cameras[0]->reset_shutter({1'021'000'000}));
@@ -144,7 +144,7 @@ TEST_F(Replay, ATrimThatWasRecordedOtherwiseIsADeviceError) {
   EXPECT_FALSE(rig_.cameras[0]->trim_rate(PartsPerMillion(-12.5)));
 }
 
-TEST_F(Replay, AStrobeSwitchedOtherwiseOrTooOftenIsADeviceError) {
+TEST_F(ReplayThreads, AStrobeSwitchedOtherwiseOrTooOftenIsADeviceError) {
   StrobeSettings steady;
   steady.output = StrobeOutput::steady;
   ASSERT_FALSE(rig_.strobe->apply(steady));
@@ -155,19 +155,19 @@ TEST_F(Replay, AStrobeSwitchedOtherwiseOrTooOftenIsADeviceError) {
   EXPECT_EQ(third.error().kind, ErrorKind::device);
 }
 
-TEST_F(Replay, ACameraThatIsNotStartedGivesNoFrames) {
+TEST_F(ReplayThreads, ACameraThatIsNotStartedGivesNoFrames) {
   rig_.cameras[0]->stop();
   EXPECT_EQ(rig_.cameras[0]->next_frame(Seconds(1)).error().kind, ErrorKind::device);
   ASSERT_TRUE(rig_.cameras[0]->start());
   EXPECT_EQ(rig_.cameras[0]->next_frame(Seconds(1))->stamp.frame_id, 0U);
 }
 
-TEST_F(Replay, SleepingTakesNoTimeAndDoesNotMoveRecordedInstants) {
+TEST_F(ReplayThreads, SleepingTakesNoTimeAndDoesNotMoveRecordedInstants) {
   rig_.clock->sleep_until({3'000'000'000'000});
   EXPECT_EQ(rig_.clock->now().ns, 1'000'000'001);
 }
 
-TEST(ReplayRig, OfAFolderWithoutASessionIsAnErrorThatNamesIt) {
+TEST(ReplayRigThreads, OfAFolderWithoutASessionIsAnErrorThatNamesIt) {
   const auto rig = ReplayRig::open("/nonexistent/session");
   ASSERT_FALSE(rig);
   EXPECT_NE(rig.error().message().find("/nonexistent/session"), std::string::npos);

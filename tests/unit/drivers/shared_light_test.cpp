@@ -45,7 +45,7 @@ void expect_same(const std::vector<LightPulse>& a, const std::vector<LightPulse>
   }
 }
 
-class SharedLightTest : public testing::Test {
+class SharedLightThreads : public testing::Test {
  protected:
   std::unique_ptr<VirtualStrobe> lead() {
     led_ = std::make_shared<StrobeTimeline>(kError);
@@ -68,7 +68,7 @@ class SharedLightTest : public testing::Test {
   LightFollower follower_{file_, clock_, followed_};
 };
 
-TEST_F(SharedLightTest, AFollowerSeesTheFlashesOfEachSetting) {
+TEST_F(SharedLightThreads, AFollowerSeesTheFlashesOfEachSetting) {
   const auto strobe = lead();
   const TimePoint begin = clock_->now();
   // Rates at which no flash is near the instant of another setting.
@@ -85,7 +85,7 @@ TEST_F(SharedLightTest, AFollowerSeesTheFlashesOfEachSetting) {
   expect_same(seen(*followed_, begin, Seconds(10)), seen(*led_, begin, Seconds(10)));
 }
 
-TEST_F(SharedLightTest, AFollowerThatComesLateSeesAll) {
+TEST_F(SharedLightThreads, AFollowerThatComesLateSeesAll) {
   const TimePoint begin = clock_->now();
   const auto strobe = lead();
   ASSERT_TRUE(strobe->apply({.output = kFlashes, .rate = Hertz(1)}).ok());
@@ -95,7 +95,7 @@ TEST_F(SharedLightTest, AFollowerThatComesLateSeesAll) {
   expect_same(seen(*followed_, begin, Seconds(10)), seen(*led_, begin, Seconds(10)));
 }
 
-TEST_F(SharedLightTest, ASettingIsToldBeforeItTakesEffectAndInEffectWhenItsCallReturns) {
+TEST_F(SharedLightThreads, ASettingIsToldBeforeItTakesEffectAndInEffectWhenItsCallReturns) {
   const auto strobe = lead();
   const TimePoint before = clock_->now();
   ASSERT_TRUE(strobe->apply({.output = kFlashes, .rate = Hertz(1)}).ok());
@@ -105,14 +105,14 @@ TEST_F(SharedLightTest, ASettingIsToldBeforeItTakesEffectAndInEffectWhenItsCallR
   EXPECT_LE(first, after - before);
 }
 
-TEST_F(SharedLightTest, ASettingThatIsRefusedIsNotTold) {
+TEST_F(SharedLightThreads, ASettingThatIsRefusedIsNotTold) {
   const auto strobe = lead();
   const std::string before = text();
   EXPECT_FALSE(strobe->apply({.rate = Hertz(1000)}).ok());
   EXPECT_EQ(text(), before);
 }
 
-TEST_F(SharedLightTest, WhenTheLeaderStartsAnewSoDoTheFollowers) {
+TEST_F(SharedLightThreads, WhenTheLeaderStartsAnewSoDoTheFollowers) {
   auto strobe = lead();
   ASSERT_TRUE(strobe->apply({.output = kFlashes, .rate = Hertz(1)}).ok());
   EXPECT_FALSE(light().empty());
@@ -132,7 +132,7 @@ TEST_F(SharedLightTest, WhenTheLeaderStartsAnewSoDoTheFollowers) {
   EXPECT_GT(seen(*followed_, later, Seconds(10)).size(), 38U);
 }
 
-TEST_F(SharedLightTest, AFileThatIsCutIsReadAnew) {
+TEST_F(SharedLightThreads, AFileThatIsCutIsReadAnew) {
   const std::string first = first_light_line({});
   write(first + light_line({wall_clock(), {.output = kFlashes, .rate = Hertz(2)}}));
   EXPECT_FALSE(light().empty());
@@ -142,7 +142,7 @@ TEST_F(SharedLightTest, AFileThatIsCutIsReadAnew) {
   EXPECT_FALSE(light().empty());
 }
 
-TEST_F(SharedLightTest, ALineCountsWhenItIsWhole) {
+TEST_F(SharedLightThreads, ALineCountsWhenItIsWhole) {
   const std::string line = light_line({wall_clock(), {.output = kFlashes, .rate = Hertz(2)}});
   write(first_light_line({}));
   for (const char part : line) {
@@ -152,7 +152,7 @@ TEST_F(SharedLightTest, ALineCountsWhenItIsWhole) {
   EXPECT_FALSE(light().empty());
 }
 
-TEST_F(SharedLightTest, AFileThatIsNoneLeavesItDarkAndIsToldOfOnce) {
+TEST_F(SharedLightThreads, AFileThatIsNoneLeavesItDarkAndIsToldOfOnce) {
   std::ostringstream told;
   const auto sink = std::make_shared<spdlog::sinks::ostream_sink_mt>(told);
   log(LogCategory::drivers).sinks().push_back(sink);
@@ -181,7 +181,7 @@ TEST_F(SharedLightTest, AFileThatIsNoneLeavesItDarkAndIsToldOfOnce) {
   log(LogCategory::drivers).sinks().pop_back();
 }
 
-TEST_F(SharedLightTest, ALeaderReplacesNoOtherFile) {
+TEST_F(SharedLightThreads, ALeaderReplacesNoOtherFile) {
   write("a letter");
   const auto refused = LightWriter::create(file_, {}, clock_);
   ASSERT_FALSE(refused.ok());
@@ -195,7 +195,7 @@ TEST_F(SharedLightTest, ALeaderReplacesNoOtherFile) {
   EXPECT_TRUE(LightWriter::create(file_, {}, clock_).ok());
 }
 
-TEST_F(SharedLightTest, TwoRigsSeeOneStrobe) {
+TEST_F(SharedLightThreads, TwoRigsSeeOneStrobe) {
   VirtualRigOptions options;
   options.cameras = {testing_support::small_camera()};
   options.light = SharedLightOptions{file_, false};
@@ -226,7 +226,7 @@ TEST_F(SharedLightTest, TwoRigsSeeOneStrobe) {
   }
 }
 
-TEST_F(SharedLightTest, AStrobeThatIsSetByHandIsNotShared) {
+TEST_F(SharedLightThreads, AStrobeThatIsSetByHandIsNotShared) {
   VirtualRigOptions options;
   options.cameras = {testing_support::small_camera()};
   options.light = SharedLightOptions{file_, true};

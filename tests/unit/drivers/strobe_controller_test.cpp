@@ -15,7 +15,7 @@ namespace {
 using testing::HasSubstr;
 using testing::StartsWith;
 
-class ControllerTest : public testing::Test {
+class ControllerThreads : public testing::Test {
  protected:
   std::string framed(const std::string& text, int number) {
     const std::string line = fmt::format(":{:02X} {}", number, text);
@@ -43,12 +43,12 @@ class ControllerTest : public testing::Test {
   Controller controller_{{.model = "uno", .serial = "E7531", .tick = 500, .shortest_width = 10000}};
 };
 
-TEST_F(ControllerTest, SaysWhatItIsAndIsDarkWhenSwitchedOn) {
+TEST_F(ControllerThreads, SaysWhatItIsAndIsDarkWhenSwitchedOn) {
   EXPECT_EQ(ask("hi"), "ok emberlock 1 uno E7531 tick=500 wid=10000 code=4096");
   EXPECT_EQ(ask("get"), "ok off per=41708375 pha=0 wid=20000 len=0 sum=65535 dog=0 n=0 bad=0");
 }
 
-TEST_F(ControllerTest, AnswersTheExampleOfItsDocumentToTheByte) {
+TEST_F(ControllerThreads, AnswersTheExampleOfItsDocumentToTheByte) {
   std::ifstream document(std::string(EMBERLOCK_SOURCE_DIR) + "/drivers/strobe_serial/PROTOCOL.md");
   std::string asked;
   int answers = 0;
@@ -63,16 +63,16 @@ TEST_F(ControllerTest, AnswersTheExampleOfItsDocumentToTheByte) {
   EXPECT_EQ(answers, 3);
 }
 
-TEST_F(ControllerTest, FitsAChipOfTwoKilobytes) { EXPECT_LE(sizeof(Controller), 1450U); }
+TEST_F(ControllerThreads, FitsAChipOfTwoKilobytes) { EXPECT_LE(sizeof(Controller), 1450U); }
 
-TEST_F(ControllerTest, RoundsPhaseAndWidthToItsTicks) {
+TEST_F(ControllerThreads, RoundsPhaseAndWidthToItsTicks) {
   EXPECT_EQ(ask(set("flash per=41708375 pha=749 wid=20250")),
             "ok flash per=41708375 pha=500 wid=20500 len=0 sum=65535 dog=0 n=0 bad=0");
   EXPECT_EQ(ask(set("flash per=3000300 pha=3000299 wid=2990000")),
             "ok flash per=3000300 pha=3000000 wid=2990000 len=0 sum=65535 dog=0 n=0 bad=0");
 }
 
-TEST_F(ControllerTest, RefusesWhatIsOutOfItsRangeAndStaysAsItWas) {
+TEST_F(ControllerThreads, RefusesWhatIsOutOfItsRangeAndStaysAsItWas) {
   EXPECT_EQ(ask(set("flash per=2999999 pha=0 wid=20000")), "err 3 per 3000000 2000000000");
   EXPECT_EQ(ask(set("flash per=5000000 pha=5000000 wid=20000")), "err 3 pha 0 4999999");
   EXPECT_EQ(ask(set("flash per=5000000 pha=0 wid=9999")), "err 3 wid 10000 4990000");
@@ -82,7 +82,7 @@ TEST_F(ControllerTest, RefusesWhatIsOutOfItsRangeAndStaysAsItWas) {
   EXPECT_THAT(ask("get"), StartsWith("ok off per=41708375"));
 }
 
-TEST_F(ControllerTest, RefusesWhatItDoesntUnderstand) {
+TEST_F(ControllerThreads, RefusesWhatItDoesntUnderstand) {
   EXPECT_EQ(ask("jump"), "err 1 command");
   EXPECT_EQ(ask("hi there"), "err 1 command");
   for (const char* text :
@@ -94,7 +94,7 @@ TEST_F(ControllerTest, RefusesWhatItDoesntUnderstand) {
   }
 }
 
-TEST_F(ControllerTest, PlaysACodeOnlyOnceItsSumIsRight) {
+TEST_F(ControllerThreads, PlaysACodeOnlyOnceItsSumIsRight) {
   EXPECT_EQ(ask("code 0 B080"), "ok");
   EXPECT_THAT(ask("get"), HasSubstr("len=0"));
   EXPECT_EQ(ask("set flash per=5000000 pha=0 wid=20000 len=9 sum=1 dog=0"), "err 4 code");
@@ -111,7 +111,7 @@ TEST_F(ControllerTest, PlaysACodeOnlyOnceItsSumIsRight) {
               HasSubstr("per=6000000"));
 }
 
-TEST_F(ControllerTest, ALineSaidTwiceIsDoneOnceAndAnsweredTwice) {
+TEST_F(ControllerThreads, ALineSaidTwiceIsDoneOnceAndAnsweredTwice) {
   const std::string line = framed(set("flash per=5000000 pha=0 wid=20000"), 9);
   const std::string first = raw(line);
   EXPECT_EQ(controller_.changes(), 1);
@@ -121,7 +121,7 @@ TEST_F(ControllerTest, ALineSaidTwiceIsDoneOnceAndAnsweredTwice) {
   EXPECT_EQ(controller_.changes(), 2);
 }
 
-TEST_F(ControllerTest, SaysNothingToADamagedLineAndCountsIt) {
+TEST_F(ControllerThreads, SaysNothingToADamagedLineAndCountsIt) {
   const std::string line = framed("get", 3);
   int damaged = 0;
   for (std::size_t i = 0; i + 1 < line.size(); ++i) {
@@ -135,7 +135,7 @@ TEST_F(ControllerTest, SaysNothingToADamagedLineAndCountsIt) {
   EXPECT_THAT(ask("get"), HasSubstr(fmt::format("bad={}", damaged + 1)));
 }
 
-TEST_F(ControllerTest, GoesDarkWhenNobodySpeaksForAsLongAsItWasTold) {
+TEST_F(ControllerThreads, GoesDarkWhenNobodySpeaksForAsLongAsItWasTold) {
   ask("set steady per=5000000 pha=0 wid=20000 len=0 sum=65535 dog=1000", 5000);
   EXPECT_FALSE(controller_.watch(5999));
   ask("get", 5999);
@@ -145,7 +145,7 @@ TEST_F(ControllerTest, GoesDarkWhenNobodySpeaksForAsLongAsItWasTold) {
   EXPECT_THAT(ask("get", 9999), StartsWith("ok off per=5000000"));
 }
 
-TEST_F(ControllerTest, TheLongestAnswerFitsItsLine) {
+TEST_F(ControllerThreads, TheLongestAnswerFitsItsLine) {
   for (int i = 0; i < 0x10001; ++i) raw("x\n");
   controller_.set_flashes(0xFFFFFFFF);
   for (int at = 0; at < 4096; at += 256)

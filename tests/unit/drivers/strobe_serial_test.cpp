@@ -20,7 +20,7 @@ using testing::HasSubstr;
 constexpr StrobeSettings kAsked{
     .output = StrobeOutput::flashing, .rate = Hertz(25), .width = milliseconds(4)};
 
-class SerialStrobeTest : public testing::TestWithParam<StrobeDialect> {
+class SerialStrobeThreads : public testing::TestWithParam<StrobeDialect> {
  protected:
   void expect_same(const StrobeSettings& told, const StrobeSettings& asked) {
     EXPECT_EQ(told.output, asked.output);
@@ -33,7 +33,7 @@ class SerialStrobeTest : public testing::TestWithParam<StrobeDialect> {
   StrobeBench bench_{GetParam()};
 };
 
-TEST_P(SerialStrobeTest, SaysItsModelAndTakesSettingsThatReadBack) {
+TEST_P(SerialStrobeThreads, SaysItsModelAndTakesSettingsThatReadBack) {
   const auto model = bench_.strobe.greet(Seconds(1));
   ASSERT_TRUE(model.ok()) << model.error().message();
   EXPECT_THAT(*model, AnyOf(HasSubstr("33509B"), HasSubstr("SDG2042X"), HasSubstr("RT260F"),
@@ -45,7 +45,7 @@ TEST_P(SerialStrobeTest, SaysItsModelAndTakesSettingsThatReadBack) {
   expect_same(*told, kAsked);
 }
 
-TEST_P(SerialStrobeTest, GoesDarkAndLightAgain) {
+TEST_P(SerialStrobeThreads, GoesDarkAndLightAgain) {
   for (const StrobeOutput output : {StrobeOutput::flashing, StrobeOutput::off, StrobeOutput::flashing}) {
     StrobeSettings s = kAsked;
     s.output = output;
@@ -54,7 +54,7 @@ TEST_P(SerialStrobeTest, GoesDarkAndLightAgain) {
   }
 }
 
-TEST_P(SerialStrobeTest, GoesFromLongFlashesOfASlowRateToShortOnesOfAFastOneAndBack) {
+TEST_P(SerialStrobeThreads, GoesFromLongFlashesOfASlowRateToShortOnesOfAFastOneAndBack) {
   for (int i = 0; i < 2; ++i) {
     for (const auto& [rate, width] : {std::pair{8.0, 0.1}, {250.0, 0.002}}) {
       const StrobeSettings s{.output = StrobeOutput::flashing, .rate = Hertz(rate), .width = Seconds(width)};
@@ -65,7 +65,7 @@ TEST_P(SerialStrobeTest, GoesFromLongFlashesOfASlowRateToShortOnesOfAFastOneAndB
   }
 }
 
-TEST_P(SerialStrobeTest, OneAnswerThatGoesWrongCostsATimeButNoError) {
+TEST_P(SerialStrobeThreads, OneAnswerThatGoesWrongCostsATimeButNoError) {
   ASSERT_TRUE(bench_.strobe.apply(kAsked).ok());
   for (const Fault fault : {Fault::silent, Fault::garbled, Fault::truncated, Fault::late, Fault::chatter}) {
     bench_.spoil({fault});
@@ -77,7 +77,7 @@ TEST_P(SerialStrobeTest, OneAnswerThatGoesWrongCostsATimeButNoError) {
   }
 }
 
-TEST_P(SerialStrobeTest, ALateAnswerIsNeverTakenForTheNextOnes) {
+TEST_P(SerialStrobeThreads, ALateAnswerIsNeverTakenForTheNextOnes) {
   ASSERT_TRUE(bench_.strobe.apply(kAsked).ok());
   for (int lead = 0; lead < 4; ++lead) {
     bench_.spoil({Fault::none, Fault::none, Fault::none});
@@ -91,7 +91,7 @@ TEST_P(SerialStrobeTest, ALateAnswerIsNeverTakenForTheNextOnes) {
   }
 }
 
-TEST_P(SerialStrobeTest, ASilentDeviceIsAnErrorWithinTwoSecondsThatSaysWhatToDo) {
+TEST_P(SerialStrobeThreads, ASilentDeviceIsAnErrorWithinTwoSecondsThatSaysWhatToDo) {
   ASSERT_TRUE(bench_.strobe.apply(kAsked).ok());
   bench_.spoil_all(Fault::silent);
   const double begin = bench_.seconds();
@@ -107,7 +107,7 @@ TEST_P(SerialStrobeTest, ASilentDeviceIsAnErrorWithinTwoSecondsThatSaysWhatToDo)
   EXPECT_TRUE(bench_.strobe.read_back().ok());
 }
 
-TEST_P(SerialStrobeTest, AGarblingDeviceIsAnErrorAndNeverAGuess) {
+TEST_P(SerialStrobeThreads, AGarblingDeviceIsAnErrorAndNeverAGuess) {
   ASSERT_TRUE(bench_.strobe.apply(kAsked).ok());
   for (const Fault fault : {Fault::garbled, Fault::truncated, Fault::chatter}) {
     bench_.spoil_all(fault);
@@ -122,7 +122,7 @@ TEST_P(SerialStrobeTest, AGarblingDeviceIsAnErrorAndNeverAGuess) {
   }
 }
 
-TEST_P(SerialStrobeTest, AnUnpluggedDeviceIsAnErrorAtOnceAndIsFoundAgainByTheNextCall) {
+TEST_P(SerialStrobeThreads, AnUnpluggedDeviceIsAnErrorAtOnceAndIsFoundAgainByTheNextCall) {
   ASSERT_TRUE(bench_.strobe.apply(kAsked).ok());
   bench_.plugged = false;
   const double begin = bench_.seconds();
@@ -134,13 +134,13 @@ TEST_P(SerialStrobeTest, AnUnpluggedDeviceIsAnErrorAtOnceAndIsFoundAgainByTheNex
   EXPECT_EQ(bench_.opened, 2);
 }
 
-TEST_P(SerialStrobeTest, ADeviceThatBootsWhenItsPortIsOpenedIsWaitedFor) {
+TEST_P(SerialStrobeThreads, ADeviceThatBootsWhenItsPortIsOpenedIsWaitedFor) {
   bench_.spoil({Fault::silent, Fault::garbled, Fault::silent, Fault::none});
   EXPECT_TRUE(bench_.strobe.greet(Seconds(3)).ok());
   EXPECT_TRUE(bench_.strobe.apply(kAsked).ok());
 }
 
-TEST_P(SerialStrobeTest, WhatCantBeIsRefusedWithoutAWordToTheDevice) {
+TEST_P(SerialStrobeThreads, WhatCantBeIsRefusedWithoutAWordToTheDevice) {
   const auto refused = [&](StrobeSettings s, const char* what, const char* remedy) {
     const Status status = bench_.strobe.apply(s);
     ASSERT_FALSE(status.ok()) << what;
@@ -158,7 +158,7 @@ TEST_P(SerialStrobeTest, WhatCantBeIsRefusedWithoutAWordToTheDevice) {
   EXPECT_EQ(bench_.heard, 0);
 }
 
-TEST_P(SerialStrobeTest, ARateThatTheDeviceClampsWithoutAWordIsAnErrorThatNamesBoth) {
+TEST_P(SerialStrobeThreads, ARateThatTheDeviceClampsWithoutAWordIsAnErrorThatNamesBoth) {
   bench_.device->silent_most_rate = 20;
   const Status status = bench_.strobe.apply(kAsked);
   ASSERT_FALSE(status.ok());
@@ -169,7 +169,7 @@ TEST_P(SerialStrobeTest, ARateThatTheDeviceClampsWithoutAWordIsAnErrorThatNamesB
   EXPECT_TRUE(bench_.strobe.apply(slower).ok());
 }
 
-TEST_P(SerialStrobeTest, AWidthThatTheDeviceClampsWithoutAWordIsAnErrorThatNamesBoth) {
+TEST_P(SerialStrobeThreads, AWidthThatTheDeviceClampsWithoutAWordIsAnErrorThatNamesBoth) {
   bench_.device->silent_widest = 0.003;
   const Status status = bench_.strobe.apply(kAsked);
   ASSERT_FALSE(status.ok());
@@ -180,14 +180,14 @@ TEST_P(SerialStrobeTest, AWidthThatTheDeviceClampsWithoutAWordIsAnErrorThatNames
   EXPECT_TRUE(bench_.strobe.apply(dark).ok()) << "no flash that could be too short";
 }
 
-INSTANTIATE_TEST_SUITE_P(Dialects, SerialStrobeTest, testing::ValuesIn(test::kAllDialects),
+INSTANTIATE_TEST_SUITE_P(Dialects, SerialStrobeThreads, testing::ValuesIn(test::kAllDialects),
                          [](const auto& tested) {
                            std::string name(name_of(tested.param));
                            std::replace(name.begin(), name.end(), '-', '_');
                            return name;
                          });
 
-TEST(SerialStrobeNumbered, AnAnswerWithAWrongChecksumOrNumberIsAskedForAgain) {
+TEST(SerialStrobeNumberedThreads, AnAnswerWithAWrongChecksumOrNumberIsAskedForAgain) {
   StrobeBench bench(StrobeDialect::emberlock);
   ASSERT_TRUE(bench.strobe.apply(kAsked).ok());
   for (const Fault fault : {Fault::flipped, Fault::renumbered, Fault::twice, Fault::silent}) {
@@ -202,7 +202,7 @@ TEST(SerialStrobeNumbered, AnAnswerWithAWrongChecksumOrNumberIsAskedForAgain) {
   }
 }
 
-TEST(SerialStrobeNumbered, AlwaysWrongChecksumsAreAnError) {
+TEST(SerialStrobeNumberedThreads, AlwaysWrongChecksumsAreAnError) {
   StrobeBench bench(StrobeDialect::emberlock);
   ASSERT_TRUE(bench.strobe.apply(kAsked).ok());
   bench.spoil_all(Fault::flipped);
@@ -212,7 +212,7 @@ TEST(SerialStrobeNumbered, AlwaysWrongChecksumsAreAnError) {
   EXPECT_THAT(told.error().what, HasSubstr("checksum"));
 }
 
-TEST(SerialStrobeNumbered, PlaysACodeAsLongAsTheFrameCodes) {
+TEST(SerialStrobeNumberedThreads, PlaysACodeAsLongAsTheFrameCodes) {
   StrobeBench bench(StrobeDialect::emberlock);
   for (const std::size_t length : {1, 7, 8, 31, 256, 257, 3720, 4096}) {
     StrobeSettings s = kAsked;
@@ -233,7 +233,7 @@ TEST(SerialStrobeNumbered, PlaysACodeAsLongAsTheFrameCodes) {
   EXPECT_EQ(bench.strobe.apply({.code = std::vector<bool>(4097)}).error().kind, ErrorKind::bad_input);
 }
 
-TEST(SerialStrobeDevices, AnInterlockThatKeepsTheLightOffIsAnError) {
+TEST(SerialStrobeDevicesThreads, AnInterlockThatKeepsTheLightOffIsAnError) {
   StrobeBench bench(StrobeDialect::scpi);
   bench.as<test::ScpiDevice>().takes_settings = false;
   const Status status = bench.strobe.apply(kAsked);
@@ -242,14 +242,14 @@ TEST(SerialStrobeDevices, AnInterlockThatKeepsTheLightOffIsAnError) {
   EXPECT_THAT(status.error().remedy, HasSubstr("interlock"));
 }
 
-TEST(SerialStrobeDevices, OldErrorsInAnInstrumentsQueueAreNotOurs) {
+TEST(SerialStrobeDevicesThreads, OldErrorsInAnInstrumentsQueueAreNotOurs) {
   StrobeBench bench(StrobeDialect::scpi);
   bench.as<test::ScpiDevice>().errors = {"-410,\"Query INTERRUPTED\"", "-113,\"Undefined header\""};
   EXPECT_TRUE(bench.strobe.apply(kAsked).ok());
   EXPECT_TRUE(bench.as<test::ScpiDevice>().errors.empty());
 }
 
-TEST(SerialStrobeDevices, WhatAnInstrumentRefusesIsToldWithItsOwnWords) {
+TEST(SerialStrobeDevicesThreads, WhatAnInstrumentRefusesIsToldWithItsOwnWords) {
   StrobeBench bench(StrobeDialect::scpi);
   bench.as<test::ScpiDevice>().most_rate = 20;
   const Status status = bench.strobe.apply(kAsked);
@@ -258,7 +258,7 @@ TEST(SerialStrobeDevices, WhatAnInstrumentRefusesIsToldWithItsOwnWords) {
   EXPECT_THAT(status.error().what, HasSubstr("-222,\"Data out of range\""));
 }
 
-TEST(SerialStrobeDevices, ADelayThatAGeneratorIgnoresIsAnError) {
+TEST(SerialStrobeDevicesThreads, ADelayThatAGeneratorIgnoresIsAnError) {
   StrobeBench bench(StrobeDialect::siglent_bswv);
   bench.as<test::SiglentDevice>().takes_delay = false;
   StrobeSettings s = kAsked;
@@ -269,7 +269,7 @@ TEST(SerialStrobeDevices, ADelayThatAGeneratorIgnoresIsAnError) {
   EXPECT_THAT(status.error().what, HasSubstr("its phase is 0 s, asked for 0.0395 s"));
 }
 
-TEST(SerialStrobeDevices, AGeneratorThatMakesNoPulsesIsNoStrobeUntilItIsSetUp) {
+TEST(SerialStrobeDevicesThreads, AGeneratorThatMakesNoPulsesIsNoStrobeUntilItIsSetUp) {
   for (const StrobeDialect dialect : {StrobeDialect::scpi, StrobeDialect::siglent_bswv}) {
     StrobeBench bench(dialect);
     EXPECT_EQ(bench.strobe.read_back().value().output, StrobeOutput::off);
@@ -282,7 +282,7 @@ TEST(SerialStrobeDevices, AGeneratorThatMakesNoPulsesIsNoStrobeUntilItIsSetUp) {
   }
 }
 
-TEST(SerialStrobeDevices, SomebodyElsesDeviceIsNotGreeted) {
+TEST(SerialStrobeDevicesThreads, SomebodyElsesDeviceIsNotGreeted) {
   for (const StrobeDialect spoken : test::kAllDialects) {
     for (const StrobeDialect understood : test::kAllDialects) {
       if (spoken == understood) continue;
@@ -295,7 +295,7 @@ TEST(SerialStrobeDevices, SomebodyElsesDeviceIsNotGreeted) {
   }
 }
 
-TEST(SerialStrobeDevices, AGardasoftMayEchoAndWhatItAdjustsIsAnError) {
+TEST(SerialStrobeDevicesThreads, AGardasoftMayEchoAndWhatItAdjustsIsAnError) {
   StrobeBench bench(StrobeDialect::gardasoft_rt);
   bench.as<test::GardasoftDevice>().echoes = true;
   ASSERT_TRUE(bench.strobe.apply(kAsked).ok());
@@ -304,7 +304,7 @@ TEST(SerialStrobeDevices, AGardasoftMayEchoAndWhatItAdjustsIsAnError) {
   EXPECT_NEAR(bench.strobe.read_back().value().width.value(), 0.003, 1e-9);
 }
 
-TEST(SerialStrobeDevices, AGardasoftThatReportsAFaultOfItsLightIsAnError) {
+TEST(SerialStrobeDevicesThreads, AGardasoftThatReportsAFaultOfItsLightIsAnError) {
   StrobeBench bench(StrobeDialect::gardasoft_rt);
   bench.as<test::GardasoftDevice>().event = 34;
   EXPECT_TRUE(bench.strobe.apply(kAsked).ok()) << "a fault of the past is cleared first";
@@ -315,7 +315,7 @@ TEST(SerialStrobeDevices, AGardasoftThatReportsAFaultOfItsLightIsAnError) {
   EXPECT_THAT(status.error().what, HasSubstr("Evt1,34"));
 }
 
-TEST(SerialStrobeDevices, SteadyLightIsForThoseThatCan) {
+TEST(SerialStrobeDevicesThreads, SteadyLightIsForThoseThatCan) {
   for (const StrobeDialect dialect : test::kAllDialects) {
     StrobeBench bench(dialect);
     StrobeSettings s = kAsked;
@@ -330,7 +330,7 @@ TEST(SerialStrobeDevices, SteadyLightIsForThoseThatCan) {
   }
 }
 
-TEST(SerialStrobeDevices, ASchottRoundsToWholeHertzAndThousandthsAndHasNoPhase) {
+TEST(SerialStrobeDevicesThreads, ASchottRoundsToWholeHertzAndThousandthsAndHasNoPhase) {
   StrobeBench bench(StrobeDialect::schott_cv_ls);
   ASSERT_TRUE(bench.strobe.apply({.output = StrobeOutput::flashing, .rate = Hertz(23.976)}).ok());
   const StrobeSettings told = bench.strobe.read_back().value();

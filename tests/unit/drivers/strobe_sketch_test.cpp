@@ -37,9 +37,9 @@ class SketchWire final : public Wire {
   }
 };
 
-class StrobeSketch : public testing::Test {
+class StrobeSketchThreads : public testing::Test {
  protected:
-  StrobeSketch() {
+  StrobeSketchThreads() {
     avr::chip = {};
     avr::chip.interrupt = TIMER1_COMPA_vect;
     ::controller = emberlock_controller::Controller({kModel, kSerial, kTick, kShortestWidth});
@@ -77,7 +77,7 @@ class StrobeSketch : public testing::Test {
                        [] { return Result<std::unique_ptr<Wire>>(std::make_unique<SketchWire>()); }, clock_};
 };
 
-TEST_F(StrobeSketch, FlashesAtTheRateAndWidthAskedForWithoutDrift) {
+TEST_F(StrobeSketchThreads, FlashesAtTheRateAndWidthAskedForWithoutDrift) {
   for (const double rate : {0.7, 23.976, 24000.0 / 1001, 100.0, 333.3}) {
     for (const double width : {20e-6, 1e-3, 0.9 / rate}) {
       const StrobeSettings s{.output = StrobeOutput::flashing, .rate = Hertz(rate), .width = Seconds(width)};
@@ -94,7 +94,7 @@ TEST_F(StrobeSketch, FlashesAtTheRateAndWidthAskedForWithoutDrift) {
   }
 }
 
-TEST_F(StrobeSketch, APhaseMovesTheFlashesAgainstTheSameTimeBase) {
+TEST_F(StrobeSketchThreads, APhaseMovesTheFlashesAgainstTheSameTimeBase) {
   StrobeSettings s{.output = StrobeOutput::flashing, .rate = Hertz(50)};
   apply(s);
   const double base = film(0.2).at(0).at, period = kTicks / 50;
@@ -106,7 +106,7 @@ TEST_F(StrobeSketch, APhaseMovesTheFlashesAgainstTheSameTimeBase) {
   }
 }
 
-TEST_F(StrobeSketch, PlaysItsCodeFromTheFirstFlashAfterTheSettings) {
+TEST_F(StrobeSketchThreads, PlaysItsCodeFromTheFirstFlashAfterTheSettings) {
   StrobeSettings s{.output = StrobeOutput::flashing, .rate = Hertz(100)};
   apply(s);
   const double base = film(0.1).at(0).at, period = kTicks / 100;
@@ -123,7 +123,7 @@ TEST_F(StrobeSketch, PlaysItsCodeFromTheFirstFlashAfterTheSettings) {
   }
 }
 
-TEST_F(StrobeSketch, GivesSteadyLightAndDarkness) {
+TEST_F(StrobeSketchThreads, GivesSteadyLightAndDarkness) {
   apply({.output = StrobeOutput::steady});
   EXPECT_TRUE(avr::chip.pin());
   apply({.output = StrobeOutput::flashing, .rate = Hertz(10)});
@@ -133,7 +133,7 @@ TEST_F(StrobeSketch, GivesSteadyLightAndDarkness) {
   EXPECT_TRUE(film(1).empty());
 }
 
-TEST_F(StrobeSketch, AnInterruptThatComesTooLateLosesNoFlashAndLeavesNoLightOn) {
+TEST_F(StrobeSketchThreads, AnInterruptThatComesTooLateLosesNoFlashAndLeavesNoLightOn) {
   apply({.output = StrobeOutput::flashing, .rate = Hertz(200), .width = microseconds(20)});
   avr::chip.slow = 60;  // 30 us: another interrupt was first
   const auto flashes = film(0.5);
@@ -141,7 +141,7 @@ TEST_F(StrobeSketch, AnInterruptThatComesTooLateLosesNoFlashAndLeavesNoLightOn) 
   for (const Flash& flash : flashes) EXPECT_LT(flash.width, 70);
 }
 
-TEST_F(StrobeSketch, CountsTheFlashesThatItGave) {
+TEST_F(StrobeSketchThreads, CountsTheFlashesThatItGave) {
   apply({.output = StrobeOutput::flashing, .rate = Hertz(100), .code = {true, false}});
   const std::uint32_t before = ::given;
   const auto flashes = film(1);

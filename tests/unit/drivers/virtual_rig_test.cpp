@@ -34,7 +34,7 @@ std::vector<VirtualCameraOptions> cameras(int count) {
   return all;
 }
 
-TEST(VirtualRig, FramesComeAtTheEndOfTheirReadPhase) {
+TEST(VirtualRigThreads, FramesComeAtTheEndOfTheirReadPhase) {
   const auto rig = small_rig({small_camera()}, {});
   ASSERT_TRUE(rig->camera(0).start().ok());
   for (std::uint64_t id = 0; id < 5; ++id) {
@@ -61,7 +61,7 @@ class DriversLog {
   std::shared_ptr<spdlog::sinks::sink> sink_ = std::make_shared<spdlog::sinks::ostream_sink_mt>(text_);
 };
 
-TEST(VirtualRig, FramesThatAreHeldBackComeLaterAndShowTheSame) {
+TEST(VirtualRigThreads, FramesThatAreHeldBackComeLaterAndShowTheSame) {
   VirtualCameraOptions camera = small_camera();
   const auto at_once = small_rig({camera}, {Pass::lamp});
   camera.transport = milliseconds(125);
@@ -79,7 +79,7 @@ TEST(VirtualRig, FramesThatAreHeldBackComeLaterAndShowTheSame) {
   EXPECT_EQ(held->camera(0).pass_over(held->clock().now()), 0U) << "what hasn't come can't be passed over";
 }
 
-TEST(VirtualRig, FramesThatAreLostAreCountedWithoutALineOfTheJournalEach) {
+TEST(VirtualRigThreads, FramesThatAreLostAreCountedWithoutALineOfTheJournalEach) {
   const DriversLog said;
   const auto rig = small_rig({small_camera()}, {});
   ASSERT_TRUE(rig->camera(0).start().ok());
@@ -89,7 +89,7 @@ TEST(VirtualRig, FramesThatAreLostAreCountedWithoutALineOfTheJournalEach) {
   EXPECT_EQ(said.text(), "");
 }
 
-TEST(VirtualRig, FramesThatArePassedOverAreCountedAndNotLost) {
+TEST(VirtualRigThreads, FramesThatArePassedOverAreCountedAndNotLost) {
   const DriversLog said;
   const auto rig = small_rig({small_camera()}, {});
   Camera& camera = rig->camera(0);
@@ -106,7 +106,7 @@ TEST(VirtualRig, FramesThatArePassedOverAreCountedAndNotLost) {
   EXPECT_EQ(said.text(), "");
 }
 
-TEST(VirtualRig, AShortDeadlineTimesOutAndLosesNothing) {
+TEST(VirtualRigThreads, AShortDeadlineTimesOutAndLosesNothing) {
   const auto rig = small_rig({small_camera()}, {});
   ASSERT_TRUE(rig->camera(0).start().ok());
   const auto late = rig->camera(0).next_frame(milliseconds(10));
@@ -120,7 +120,7 @@ TEST(VirtualRig, AShortDeadlineTimesOutAndLosesNothing) {
   EXPECT_TRUE(rig->camera(0).next_frame(Seconds(std::numeric_limits<double>::infinity())).ok());
 }
 
-TEST(VirtualRig, ACameraThatDoesNotFilmSaysSo) {
+TEST(VirtualRigThreads, ACameraThatDoesNotFilmSaysSo) {
   const auto rig = small_rig({small_camera()}, {});
   EXPECT_EQ(rig->camera(0).next_frame(Seconds(1)).error().kind, ErrorKind::device);
   EXPECT_EQ(rig->camera(0).reset_shutter({}).error().kind, ErrorKind::device);
@@ -130,7 +130,7 @@ TEST(VirtualRig, ACameraThatDoesNotFilmSaysSo) {
   EXPECT_EQ(rig->camera(0).next_frame(Seconds(1)).error().kind, ErrorKind::device);
 }
 
-TEST(VirtualRig, CamerasUsedOneAfterTheOtherKeepTheirFramesInOrder) {
+TEST(VirtualRigThreads, CamerasUsedOneAfterTheOtherKeepTheirFramesInOrder) {
   const auto rig = small_rig(cameras(3), {});
   for (int c = 0; c < 3; ++c) ASSERT_TRUE(rig->camera(c).start().ok());
   TimePoint last;
@@ -144,7 +144,7 @@ TEST(VirtualRig, CamerasUsedOneAfterTheOtherKeepTheirFramesInOrder) {
   EXPECT_LT((rig->clock().now() - last).value(), 1.1 / 24);  // the others had their frames waiting
 }
 
-TEST(VirtualRig, AQueueThatOverflowsShowsAsAGap) {
+TEST(VirtualRigThreads, AQueueThatOverflowsShowsAsAGap) {
   const auto rig = small_rig(cameras(2), {});
   for (int c = 0; c < 2; ++c) ASSERT_TRUE(rig->camera(c).start().ok());
   ASSERT_EQ(rig->camera(1).next_frame(Seconds(1)).value().stamp.frame_id, 0U);
@@ -157,7 +157,7 @@ TEST(VirtualRig, AQueueThatOverflowsShowsAsAGap) {
   EXPECT_EQ(rig->camera(1).next_frame(Seconds(0)).error().kind, ErrorKind::timed_out);
 }
 
-TEST(VirtualRig, TheSameSeedGivesTheSameFramesInAnyOrder) {
+TEST(VirtualRigThreads, TheSameSeedGivesTheSameFramesInAnyOrder) {
   const std::vector<Pass> all = {Pass::lamp,       Pass::bloom,      Pass::smear,   Pass::hot_pixels,
                                  Pass::shot_noise, Pass::read_noise, Pass::quantise};
   const auto film = [&](bool camera_by_camera) {
@@ -182,7 +182,7 @@ TEST(VirtualRig, TheSameSeedGivesTheSameFramesInAnyOrder) {
   EXPECT_NE(*a[0].image, *a[1].image);
 }
 
-TEST(VirtualRig, AnotherSeedDrawsOtherPhasesAndNoise) {
+TEST(VirtualRigThreads, AnotherSeedDrawsOtherPhasesAndNoise) {
   const auto a = draw_virtual_rig({.cameras = 2, .seed = 1});
   const auto b = draw_virtual_rig({.cameras = 2, .seed = 2});
   EXPECT_NE(a.cameras[0].lamp.x, b.cameras[0].lamp.x);
@@ -193,7 +193,7 @@ TEST(VirtualRig, AnotherSeedDrawsOtherPhasesAndNoise) {
   EXPECT_EQ(a.cameras[1].reset_latency, again.cameras[1].reset_latency);
 }
 
-TEST(VirtualRig, AResetByHandDrawsAUniformPhase) {
+TEST(VirtualRigThreads, AResetByHandDrawsAUniformPhase) {
   VirtualCameraOptions c = small_camera();
   c.reset = ShutterReset::by_hand;
   const auto rig = small_rig({c}, {});
@@ -212,7 +212,7 @@ TEST(VirtualRig, AResetByHandDrawsAUniformPhase) {
   EXPECT_LT(worst, 1.95 / std::sqrt(n));
 }
 
-TEST(VirtualRig, ATimedResetLandsWithinItsLatencyAndJitter) {
+TEST(VirtualRigThreads, ATimedResetLandsWithinItsLatencyAndJitter) {
   const auto rig = small_rig({small_camera()}, {});
   ASSERT_TRUE(rig->camera(0).start().ok());
   double squares = 0;
@@ -230,7 +230,7 @@ TEST(VirtualRig, ATimedResetLandsWithinItsLatencyAndJitter) {
   EXPECT_NEAR(std::sqrt(squares / n), 0.2, 0.03);
 }
 
-TEST(VirtualRig, FramesBeforeAResetAreDroppedAndCounted) {
+TEST(VirtualRigThreads, FramesBeforeAResetAreDroppedAndCounted) {
   const auto rig = small_rig({small_camera()}, {});
   ASSERT_TRUE(rig->camera(0).start().ok());
   ASSERT_EQ(rig->camera(0).next_frame(Seconds(1)).value().stamp.frame_id, 0U);
@@ -242,7 +242,7 @@ TEST(VirtualRig, FramesBeforeAResetAreDroppedAndCounted) {
   EXPECT_GT(f.stamp.monotonic_time, at + Seconds(0.17));
 }
 
-TEST(VirtualRig, AResetTakesEffectAtOnceWhenItsMomentHasPassed) {
+TEST(VirtualRigThreads, AResetTakesEffectAtOnceWhenItsMomentHasPassed) {
   const auto rig = small_rig({small_camera()}, {});
   ASSERT_TRUE(rig->camera(0).start().ok());
   rig->clock().sleep_until({1'000'000'000});
@@ -257,7 +257,7 @@ VirtualCameraOptions trimmable_camera() {
   return c;
 }
 
-TEST(VirtualRig, ATrimmedCameraReadsEarlierAndLosesNoFrame) {
+TEST(VirtualRigThreads, ATrimmedCameraReadsEarlierAndLosesNoFrame) {
   const auto rig = small_rig({trimmable_camera()}, {});
   Camera& camera = rig->camera(0);
   ASSERT_TRUE(camera.start().ok());
@@ -273,7 +273,7 @@ TEST(VirtualRig, ATrimmedCameraReadsEarlierAndLosesNoFrame) {
   EXPECT_NEAR(in_microseconds(untrimmed - filmed), 100 * in_force.value(), 100 * 0.6 / 24);
 }
 
-TEST(VirtualRig, ATrimOutlastsAReset) {
+TEST(VirtualRigThreads, ATrimOutlastsAReset) {
   const auto rig = small_rig({trimmable_camera()}, {});
   Camera& camera = rig->camera(0);
   ASSERT_TRUE(camera.start().ok());
@@ -284,7 +284,7 @@ TEST(VirtualRig, ATrimOutlastsAReset) {
   EXPECT_NEAR((period * 24 / Seconds(1) - 1) * 1e6, 50, 0.01);
 }
 
-TEST(VirtualRig, ATrimOutOfRangeOrOfACameraWithoutOneIsRefused) {
+TEST(VirtualRigThreads, ATrimOutOfRangeOrOfACameraWithoutOneIsRefused) {
   const auto rig = small_rig({trimmable_camera()}, {});
   EXPECT_EQ(rig->camera(0).trim_rate(PartsPerMillion(101)).error().kind, ErrorKind::device);
   EXPECT_EQ(rig->camera(0).trim_rate(PartsPerMillion(std::nan(""))).error().kind, ErrorKind::device);
@@ -293,7 +293,7 @@ TEST(VirtualRig, ATrimOutOfRangeOrOfACameraWithoutOneIsRefused) {
   EXPECT_EQ(plain->camera(0).trim_rate(PartsPerMillion(1)).error().kind, ErrorKind::device);
 }
 
-TEST(VirtualRig, WhoResetsTheShutterCanBeChangedOrForbidden) {
+TEST(VirtualRigThreads, WhoResetsTheShutterCanBeChangedOrForbidden) {
   const auto rig = small_rig({small_camera()}, {});
   EXPECT_EQ(rig->camera(0).info().reset, ShutterReset::on_command);
   ASSERT_TRUE(rig->camera(0).start().ok());
@@ -304,7 +304,7 @@ TEST(VirtualRig, WhoResetsTheShutterCanBeChangedOrForbidden) {
   EXPECT_EQ(status.error().kind, ErrorKind::device);
 }
 
-TEST(VirtualRig, TheDevicesClockCountsNominalFrames) {
+TEST(VirtualRigThreads, TheDevicesClockCountsNominalFrames) {
   VirtualCameraOptions c = small_camera();
   c.timing.frame_period = Seconds(1.0001 / 24);
   const auto rig = small_rig({c}, {});
@@ -317,7 +317,7 @@ TEST(VirtualRig, TheDevicesClockCountsNominalFrames) {
   EXPECT_EQ(b.stamp.system_time - a.stamp.system_time, b.stamp.monotonic_time - a.stamp.monotonic_time);
 }
 
-TEST(VirtualRig, ASceneChangesWithTheNextReadPhase) {
+TEST(VirtualRigThreads, ASceneChangesWithTheNextReadPhase) {
   const auto rig = small_rig({small_camera()}, {});
   ASSERT_TRUE(rig->camera(0).start().ok());
   rig->clock().sleep_until(rig->read_start_after(0, {500'000'000}) + milliseconds(1));
@@ -344,7 +344,7 @@ std::vector<VirtualCameraOptions> fast_cameras(int count) {
   return all;
 }
 
-TEST(VirtualRig, RunsInRealTimeWithASteadyClock) {
+TEST(VirtualRigThreads, RunsInRealTimeWithASteadyClock) {
   const auto clock = std::make_shared<SteadyClock>();
   const auto rig = small_rig(fast_cameras(1), {Pass::read_noise}, clock);
   const TimePoint begin = clock->now();
@@ -357,7 +357,7 @@ TEST(VirtualRig, RunsInRealTimeWithASteadyClock) {
   EXPECT_GT(clock->now() - begin, milliseconds(45));
 }
 
-TEST(VirtualRig, EachCameraMayHaveAThreadOfItsOwn) {
+TEST(VirtualRigThreads, EachCameraMayHaveAThreadOfItsOwn) {
   const auto rig = small_rig(fast_cameras(3), {Pass::lamp, Pass::smear, Pass::read_noise},
                              std::make_shared<SteadyClock>());
   std::atomic<int> taken = 0;

@@ -14,7 +14,7 @@ namespace {
 
 using testing::HasSubstr;
 
-class VirtualStrobeTest : public testing::Test {
+class VirtualStrobeThreads : public testing::Test {
  protected:
   std::vector<double> flashes(double from, double to) const {
     std::vector<double> begins;
@@ -38,19 +38,19 @@ class VirtualStrobeTest : public testing::Test {
 
 constexpr auto kFlashing = StrobeOutput::flashing;
 
-TEST_F(VirtualStrobeTest, RateIsRoundedToATenthOfAFlashAMinute) {
+TEST_F(VirtualStrobeThreads, RateIsRoundedToATenthOfAFlashAMinute) {
   ASSERT_TRUE(strobe_.apply({.output = kFlashing, .rate = Hertz(23.976)}).ok());
   EXPECT_DOUBLE_EQ(strobe_.read_back().value().rate.value() * 60, 1438.6);
   EXPECT_NEAR(flashes(1, 2).at(1) - flashes(1, 2).at(0), 60 / 1438.6, 1e-12);
 }
 
-TEST_F(VirtualStrobeTest, TheWholeRangeOfRatesIsAccepted) {
+TEST_F(VirtualStrobeThreads, TheWholeRangeOfRatesIsAccepted) {
   for (const double rate : {0.5, 333.3, 20000.0 / 60}) {
     EXPECT_TRUE(strobe_.apply({.output = kFlashing, .rate = Hertz(rate)}).ok()) << rate;
   }
 }
 
-TEST_F(VirtualStrobeTest, ReadBackOfRoundedSettingsIsAcceptedAgain) {
+TEST_F(VirtualStrobeThreads, ReadBackOfRoundedSettingsIsAcceptedAgain) {
   const double longest = 1 / 333.3;
   ASSERT_TRUE(strobe_
                   .apply({.rate = Hertz(333.3),
@@ -62,7 +62,7 @@ TEST_F(VirtualStrobeTest, ReadBackOfRoundedSettingsIsAcceptedAgain) {
   EXPECT_EQ(strobe_.read_back().value(), once);
 }
 
-TEST_F(VirtualStrobeTest, SettingsOutOfRangeAreRefusedWithTheRange) {
+TEST_F(VirtualStrobeThreads, SettingsOutOfRangeAreRefusedWithTheRange) {
   const double nan = std::numeric_limits<double>::quiet_NaN();
   for (const double rate : {0.49, 334.0, 0.0, -1.0, nan}) expect_refused({.rate = Hertz(rate)}, "rate");
   for (const double phase : {-1e-6, 0.1, nan})
@@ -72,14 +72,14 @@ TEST_F(VirtualStrobeTest, SettingsOutOfRangeAreRefusedWithTheRange) {
   expect_refused({.code = std::vector<bool>(4097)}, "code");
 }
 
-TEST_F(VirtualStrobeTest, RefusedSettingsChangeNothing) {
+TEST_F(VirtualStrobeThreads, RefusedSettingsChangeNothing) {
   ASSERT_TRUE(strobe_.apply({.output = kFlashing, .rate = Hertz(10)}).ok());
   ASSERT_FALSE(strobe_.apply({.output = kFlashing, .rate = Hertz(1000)}).ok());
   EXPECT_EQ(strobe_.read_back().value().rate, Hertz(10));
   EXPECT_EQ(flashes(0, 1).size(), 10U);
 }
 
-TEST_F(VirtualStrobeTest, AChangedPhaseMovesTheFlashesByTheDifference) {
+TEST_F(VirtualStrobeThreads, AChangedPhaseMovesTheFlashesByTheDifference) {
   ASSERT_TRUE(strobe_.apply({.output = kFlashing, .rate = Hertz(10), .phase = Seconds(0.02)}).ok());
   clock_->sleep_until({1'037'000'000});
   ASSERT_TRUE(strobe_.apply({.output = kFlashing, .rate = Hertz(10), .phase = Seconds(0.05)}).ok());
@@ -89,7 +89,7 @@ TEST_F(VirtualStrobeTest, AChangedPhaseMovesTheFlashesByTheDifference) {
   for (int i = 0; i < 4; ++i) EXPECT_NEAR(begins[i], expected[i], 1e-12);
 }
 
-TEST_F(VirtualStrobeTest, AChangedRateBeginsAnewWhenItIsApplied) {
+TEST_F(VirtualStrobeThreads, AChangedRateBeginsAnewWhenItIsApplied) {
   ASSERT_TRUE(strobe_.apply({.output = kFlashing, .rate = Hertz(10)}).ok());
   clock_->sleep_until({1'037'000'000});
   ASSERT_TRUE(strobe_.apply({.output = kFlashing, .rate = Hertz(20)}).ok());
@@ -100,7 +100,7 @@ TEST_F(VirtualStrobeTest, AChangedRateBeginsAnewWhenItIsApplied) {
   EXPECT_NEAR(begins[2], 1.087, 1e-12);
 }
 
-TEST_F(VirtualStrobeTest, ACodeSkipsFlashesAndRepeats) {
+TEST_F(VirtualStrobeThreads, ACodeSkipsFlashesAndRepeats) {
   ASSERT_TRUE(
       strobe_.apply({.output = kFlashing, .rate = Hertz(10), .code = {true, false, false, true}}).ok());
   const auto begins = flashes(0, 0.8);
@@ -109,7 +109,7 @@ TEST_F(VirtualStrobeTest, ACodeSkipsFlashesAndRepeats) {
   for (int i = 0; i < 4; ++i) EXPECT_NEAR(begins[i], expected[i], 1e-12);
 }
 
-TEST_F(VirtualStrobeTest, OffGivesNoLightAndSteadyGivesItWithoutAGap) {
+TEST_F(VirtualStrobeThreads, OffGivesNoLightAndSteadyGivesItWithoutAGap) {
   EXPECT_TRUE(flashes(0, 10).empty());
   ASSERT_TRUE(strobe_.apply({.output = StrobeOutput::steady}).ok());
   clock_->sleep_until({2'000'000'000});

@@ -14,7 +14,7 @@
 namespace emberlock::recon {
 namespace {
 
-ON_EACH_DEVICE(BackgroundTest);
+ON_EACH_DEVICE_SANITIZED_TOO(BackgroundTest);
 
 constexpr double kBack[3] = {10, 60, 200};
 

@@ -20,7 +20,8 @@
 namespace emberlock::recon {
 namespace {
 
-ON_EACH_DEVICE(DescentOn);
+ON_EACH_DEVICE_SANITIZED_TOO(DescentOn);
+ON_EACH_DEVICE(PointingSearch);
 
 double after_passes(Descent& descent, int passes) {
   for (int p = 0; p < passes; ++p) descent.pass();
@@ -180,7 +181,7 @@ TEST_P(DescentOn, SearchesThatDivergeFindNothingAndEndNoReconstruction) {
   EXPECT_FALSE(pointing.any());
 }
 
-TEST_P(DescentOn, TheSearchForPointingEndsWithItsShareOfTheBudget) {
+TEST_P(PointingSearch, TheSearchForPointingEndsWithItsShareOfTheBudget) {
   Pool pool(2, device_here());
   SolveOptions options;
   Scene scene = ball_of(64);

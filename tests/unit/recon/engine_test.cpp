@@ -34,7 +34,7 @@ class EngineOrder : public OnEachDevice {
   Pool pool_{2, device_here()};
   Problem problem_ = two_subsets();
 };
-INSTANTIATE_TEST_SUITE_P(Devices, EngineOrder, testing::ValuesIn(devices()),
+INSTANTIATE_TEST_SUITE_P(Devices, EngineOrder, testing::ValuesIn(every_device()),
                          [](const auto& on) { return device_name(on.param); });
 
 TEST_P(EngineOrder, WhatWasNeverKeptIsNotGoneBackTo) {

@@ -91,7 +91,7 @@ TEST(FlameMask, EqualsWhatLookingAtEachPixelAndItsNeighboursFinds) {
   }
 }
 
-TEST(FlameMask, OfAllViewsAreTheSameOnAnyNumberOfThreads) {
+TEST(FlameMaskThreads, OfAllViewsAreTheSameOnAnyNumberOfThreads) {
   const Scene scene = small_flame_scene();
   const std::vector<FlameMask> alone = flame_masks(scene, {}, {Device::cpu, 1});
   const std::vector<FlameMask> three = flame_masks(scene, {}, {Device::cpu, 3});
@@ -101,7 +101,7 @@ TEST(FlameMask, OfAllViewsAreTheSameOnAnyNumberOfThreads) {
   }
 }
 
-TEST(FlameMask, OfAllViewsAreTheSameOnAnyDevice) {
+TEST(FlameMaskThreads, OfAllViewsAreTheSameOnAnyDevice) {
   Scene scene = small_flame_scene();
   for (const ImageSize size :
        {ImageSize{64, 48}, {37, 29}, {203, 61}, {5, 4}, {4, 7}, {3, 9}, {1, 1}, {2, 40}})

@@ -15,7 +15,8 @@
 namespace emberlock::recon {
 namespace {
 
-ON_EACH_DEVICE(HeldOutTrace);
+ON_EACH_DEVICE(HeldOutTraceThreads);
+ON_EACH_DEVICE_SANITIZED_TOO(JudgedVolumeThreads);
 
 const Effects kHeldOutMedium = absorbing(PerMeter(32.8));
 
@@ -43,7 +44,7 @@ SolveOptions at_most_iterations(int iterations, SolveOptions::Trace trace = Solv
   return options;
 }
 
-TEST_P(HeldOutTrace, IsAnEstimateFromFewPixelsThatEndsAtTheErrorOfAll) {
+TEST_P(HeldOutTraceThreads, IsAnEstimateFromFewPixelsThatEndsAtTheErrorOfAll) {
   const Scene scene = scene_with_two_held_out();
   const Reconstruction sampled = solved_here(scene, at_most_iterations(5));
   const Reconstruction whole = solved_here(scene, at_most_iterations(5, SolveOptions::Trace::whole));
@@ -64,7 +65,7 @@ TEST_P(HeldOutTrace, IsAnEstimateFromFewPixelsThatEndsAtTheErrorOfAll) {
 }
 
 /// A view is wrong everywhere but where the sample looks.
-TEST_P(HeldOutTrace, ATargetIsReachedByAllPixelsNotByTheSample) {
+TEST_P(HeldOutTraceThreads, ATargetIsReachedByAllPixelsNotByTheSample) {
   Scene scene = scene_with_two_held_out();
   scene.views[3].role = ViewRole::input;
   const Reconstruction before = solved_here(scene, at_most_iterations(4));
@@ -88,7 +89,7 @@ TEST_P(HeldOutTrace, ATargetIsReachedByAllPixelsNotByTheSample) {
   EXPECT_GT(all_channels(*r.heldout_rmse), *options.target_rmse);
 }
 
-TEST_P(HeldOutTrace, AnEngineJudgesAnothersVolumeWhereItLies) {
+TEST_P(JudgedVolumeThreads, AnEngineJudgesAnothersVolumeWhereItLies) {
   const Scene scene = scene_with_two_held_out();
   const Hull hull = whole_grid(grid_over(scene.box, 24));
   Pool pool(2, device_here());
@@ -161,7 +162,7 @@ TEST_P(HeldOutTrace, AnEngineJudgesAnothersVolumeWhereItLies) {
 }
 
 /// The work that a trace adds, counted in pixels: a twentieth of the fitted ones, and only forwards.
-TEST_P(HeldOutTrace, TakesATwentiethOfTheFittedPixelsHoweverManyViewsAreHeldOut) {
+TEST_P(HeldOutTraceThreads, TakesATwentiethOfTheFittedPixelsHoweverManyViewsAreHeldOut) {
   Scene scene = scene_with_two_held_out();
   for (const std::size_t v : {1U, 5U, 7U}) scene.views[v].role = ViewRole::held_out;
   std::size_t fitted = 0;

@@ -19,7 +19,7 @@
 namespace emberlock::recon {
 namespace {
 
-ON_EACH_DEVICE(LevelOn);
+ON_EACH_DEVICE_SANITIZED_TOO(LevelOn);
 
 constexpr int kRays[2] = {40, 30};
 

@@ -401,7 +401,7 @@ class OutcomeTest : public OnEachDevice {
   Outcome outcome_;
 };
 
-INSTANTIATE_TEST_SUITE_P(Devices, OutcomeTest, testing::ValuesIn(devices()),
+INSTANTIATE_TEST_SUITE_P(Devices, OutcomeTest, testing::ValuesIn(every_device()),
                          [](const auto& on) { return device_name(on.param); });
 
 TEST_P(OutcomeTest, EveryViewIsWrittenHeldOutOnesToo) {

@@ -11,7 +11,7 @@
 namespace emberlock::recon {
 namespace {
 
-ON_EACH_DEVICE(RayListOn);
+ON_EACH_DEVICE_SANITIZED_TOO(RayListOn);
 
 /// Bayer's matrix (1973), as it is printed.
 constexpr int kBayer[4][4] = {{0, 8, 2, 10}, {12, 4, 14, 6}, {3, 11, 1, 9}, {15, 7, 13, 5}};

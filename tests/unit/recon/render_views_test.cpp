@@ -9,7 +9,7 @@
 namespace emberlock::recon {
 namespace {
 
-ON_EACH_DEVICE(RenderViews);
+ON_EACH_DEVICE_SANITIZED_TOO(RenderViews);
 
 /// Cameras of several sizes, one of which looks away, under each effect that views share something of.
 TEST_P(RenderViews, TogetherShowWhatEachShowsAlone) {

@@ -16,9 +16,10 @@ namespace emberlock::recon {
 namespace {
 
 ON_EACH_DEVICE(SolverTest);
+ON_EACH_DEVICE(WatchedSolverThreads);
 
 class BesideTheCpu : public OnEachDevice {};
-INSTANTIATE_TEST_SUITE_P(Devices, BesideTheCpu, testing::ValuesIn(other_devices()),
+INSTANTIATE_TEST_SUITE_P(Devices, BesideTheCpu, testing::ValuesIn(others_of(devices())),
                          [](const auto& on) { return device_name(on.param); });
 GTEST_ALLOW_UNINSTANTIATED_PARAMETERIZED_TEST(BesideTheCpu);  // where there is no GPU
 
@@ -154,7 +155,7 @@ TEST_P(BesideTheCpu, ReconstructsWhatTheCpuDoes) {
               0.01);
 }
 
-TEST_P(SolverTest, WhoWatchesSeesAnEarlierVolumeAndChangesNothing) {
+TEST_P(WatchedSolverThreads, WhoWatchesSeesAnEarlierVolumeAndChangesNothing) {
   const Scene scene = small_flame_scene();
   const Grid grid = grid_over(scene.box, 32);
   const auto alone = solve(scene, grid, kPaperMedium, on_device(6));

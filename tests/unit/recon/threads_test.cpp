@@ -15,7 +15,7 @@
 namespace emberlock::recon {
 namespace {
 
-ON_EACH_DEVICE(Threads);
+ON_EACH_DEVICE_SANITIZED_TOO(Threads);
 
 template <class T>
 void expect_same_bits(const std::function<std::vector<T>(int threads)>& result) {

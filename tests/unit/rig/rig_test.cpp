@@ -41,7 +41,7 @@ RigConfig fast_rig(int cameras) {
   return config;
 }
 
-TEST(Rig, OneRigsStrobeLightsTheOthers) {
+TEST(RigThreads, OneRigsStrobeLightsTheOthers) {
   const test::TempFolder folder;
   RigConfig config;
   config.cameras = {virtual_cameras(1)};
@@ -66,7 +66,7 @@ TEST(Rig, OneRigsStrobeLightsTheOthers) {
   EXPECT_GT(dots(**follower), 10U);
 }
 
-TEST(Rig, FastVirtualCamerasAlignOnTheirOwnClock) {
+TEST(RigThreads, FastVirtualCamerasAlignOnTheirOwnClock) {
   RigConfig config = fast_rig(3);
   auto rig = Rig::open(config);
   ASSERT_TRUE(rig.ok()) << rig.error().message();
@@ -87,7 +87,7 @@ TEST(Rig, FastVirtualCamerasAlignOnTheirOwnClock) {
   EXPECT_GT((*rig)->clock().now().ns, 0);
 }
 
-TEST(Rig, IsTheSameEachTimeWhenItIsFast) {
+TEST(RigThreads, IsTheSameEachTimeWhenItIsFast) {
   const auto stamps = [] {
     auto rig = Rig::open(fast_rig(2)).value();
     std::vector<std::int64_t> all;
@@ -101,7 +101,7 @@ TEST(Rig, IsTheSameEachTimeWhenItIsFast) {
   EXPECT_EQ(stamps(), stamps());
 }
 
-TEST(Rig, CamerasOfSeveralBlocksKeepTheirOrderAndDifferInTruth) {
+TEST(RigThreads, CamerasOfSeveralBlocksKeepTheirOrderAndDifferInTruth) {
   RigConfig config = fast_rig(2);
   CameraConfig other = virtual_cameras(1, {160, 120});
   other.id = "left one";
@@ -128,7 +128,7 @@ TEST(Rig, CamerasOfSeveralBlocksKeepTheirOrderAndDifferInTruth) {
   }
 }
 
-TEST(Rig, WhatCantBeTogetherIsRefused) {
+TEST(RigThreads, WhatCantBeTogetherIsRefused) {
   const auto refusal = [](const RigConfig& config) {
     const auto rig = Rig::open(config);
     return rig.ok() ? std::string() : rig.error().message();
@@ -154,7 +154,7 @@ TEST(Rig, WhatCantBeTogetherIsRefused) {
               HasSubstr("there is no camera nobody"));
 }
 
-TEST(Rig, AStrobeThatIsSetByHandTellsTheAlignmentOfItsDial) {
+TEST(RigThreads, AStrobeThatIsSetByHandTellsTheAlignmentOfItsDial) {
   RigConfig config = fast_rig(1);
   EXPECT_FALSE(Rig::open(config).value()->align_options({})->align.dial);
   config.strobe.source = StrobeSource::manual;
@@ -167,9 +167,9 @@ TEST(Rig, AStrobeThatIsSetByHandTellsTheAlignmentOfItsDial) {
   EXPECT_FALSE(Rig::open(config).ok());
 }
 
-class RigInRealTime : public testing::Test {
+class RigInRealTimeThreads : public testing::Test {
  protected:
-  RigInRealTime() { test::unplug("c1"); }
+  RigInRealTimeThreads() { test::unplug("c1"); }
   static RigConfig config() {
     RigConfig rig;
     rig.cameras = {virtual_cameras(2, {64, 48})};
@@ -185,7 +185,7 @@ class RigInRealTime : public testing::Test {
   RigOptions options{.drivers = drivers};
 };
 
-TEST_F(RigInRealTime, ACameraThatIsAbsentAtStartIsLostUntilItComes) {
+TEST_F(RigInRealTimeThreads, ACameraThatIsAbsentAtStartIsLostUntilItComes) {
   auto rig = Rig::open(config(), options);
   ASSERT_TRUE(rig.ok()) << rig.error().message();
   EXPECT_EQ((*rig)->pace(), Rig::Pace::real_time);
@@ -216,7 +216,7 @@ TEST_F(RigInRealTime, ACameraThatIsAbsentAtStartIsLostUntilItComes) {
   EXPECT_TRUE(wait_until([&] { return (*rig)->state(2) == Thread::filming; }));
 }
 
-TEST_F(RigInRealTime, EveryFrameIsShownAlsoThoseThatNobodyTakes) {
+TEST_F(RigInRealTimeThreads, EveryFrameIsShownAlsoThoseThatNobodyTakes) {
   test::plug_in("c1");
   std::array<std::atomic<int>, 3> shown{};
   const auto screen = std::make_shared<int>();
@@ -236,9 +236,9 @@ TEST_F(RigInRealTime, EveryFrameIsShownAlsoThoseThatNobodyTakes) {
 }
 
 /// An alignment of two virtual cameras, recorded.
-class RigOfARecording : public testing::Test {
+class RigOfARecordingThreads : public testing::Test {
  protected:
-  RigOfARecording() {
+  RigOfARecordingThreads() {
     test::SmallBench bench(test::small_rig(4, 2));
     EXPECT_TRUE(record_align(folder / "session", bench.align, bench.options).ok());
     CameraConfig recorded;
@@ -251,7 +251,7 @@ class RigOfARecording : public testing::Test {
   RigConfig config;
 };
 
-TEST_F(RigOfARecording, RunsOnItsOwnClockWhenAllOfItIsRecorded) {
+TEST_F(RigOfARecordingThreads, RunsOnItsOwnClockWhenAllOfItIsRecorded) {
   config.strobe.source = StrobeSource::replay;
   auto rig = Rig::open(config);
   ASSERT_TRUE(rig.ok()) << rig.error().message();
@@ -266,7 +266,7 @@ TEST_F(RigOfARecording, RunsOnItsOwnClockWhenAllOfItIsRecorded) {
   EXPECT_THAT(Rig::open(config).error().message(), HasSubstr("the session has no such camera"));
 }
 
-TEST_F(RigOfARecording, FilmsAtItsOldPaceBesideLiveCameras) {
+TEST_F(RigOfARecordingThreads, FilmsAtItsOldPaceBesideLiveCameras) {
   config.cameras.push_back(virtual_cameras(1, {64, 48}));
   config.cameras.back().id = "live";
   config.strobe.source = StrobeSource::virtual_;

@@ -36,7 +36,7 @@ SessionWriter writer_for(const std::filesystem::path& folder, std::size_t camera
 
 std::uint64_t accounted(const v1::Counts& c) { return c.recorded() + c.camera_gap() + c.queue() + c.disk(); }
 
-TEST(AsyncWriter, CamerasPushAtOnceAndEveryFrameIsWritten) {
+TEST(AsyncWriterThreads, CamerasPushAtOnceAndEveryFrameIsWritten) {
   const TempFolder temp;
   AsyncWriter writer(writer_for(temp / "s", 3), {.queue_time = kEver});
   std::vector<std::thread> cameras;
@@ -60,7 +60,7 @@ TEST(AsyncWriter, CamerasPushAtOnceAndEveryFrameIsWritten) {
   }
 }
 
-TEST(AsyncWriter, AFullQueueLosesFramesCountedAsTheQueues) {
+TEST(AsyncWriterThreads, AFullQueueLosesFramesCountedAsTheQueues) {
   const TempFolder temp;
   const ImageLayout large{{1280, 720}, PixelFormat::gray8, 8};
   auto writer = SessionWriter::create(temp / "s", manifest_of({large}), small_disk_options());
@@ -86,7 +86,7 @@ TEST(AsyncWriter, AFullQueueLosesFramesCountedAsTheQueues) {
   EXPECT_EQ(accounted(counts), id);
 }
 
-TEST(AsyncWriter, LossesOfTheDriverAreTakenFromTheCamerasGaps) {
+TEST(AsyncWriterThreads, LossesOfTheDriverAreTakenFromTheCamerasGaps) {
   const TempFolder temp;
   AsyncWriter writer(writer_for(temp / "s", 1), {.queue_time = kEver});
   for (const std::uint64_t id : {0, 1, 6}) EXPECT_TRUE(writer.push(0, noise_frame(kLayout, id)));
@@ -99,7 +99,7 @@ TEST(AsyncWriter, LossesOfTheDriverAreTakenFromTheCamerasGaps) {
   EXPECT_EQ(manifest->cameras(0).counts().underrun(), 2U);
 }
 
-TEST(AsyncWriter, NoSpaceIsToldWhileRecordingAndCountedAsTheDisks) {
+TEST(AsyncWriterThreads, NoSpaceIsToldWhileRecordingAndCountedAsTheDisks) {
   const TempFolder temp;
   WriterOptions options;
   options.min_free_bytes = std::uint64_t{1} << 60;
@@ -114,7 +114,7 @@ TEST(AsyncWriter, NoSpaceIsToldWhileRecordingAndCountedAsTheDisks) {
   EXPECT_EQ(async.failure()->kind, ErrorKind::io);
 }
 
-TEST(AsyncWriter, AFrameOfAnotherLayoutIsToldAndCounted) {
+TEST(AsyncWriterThreads, AFrameOfAnotherLayoutIsToldAndCounted) {
   const TempFolder temp;
   AsyncWriter writer(writer_for(temp / "s", 1), {.queue_time = kEver});
   EXPECT_TRUE(writer.push(0, noise_frame({{48, 64}, PixelFormat::gray8, 8}, 0)));
@@ -168,7 +168,7 @@ std::uint64_t push_until_it_hangs(AsyncWriter& writer, const StalledDisk& disk) 
   return pushed;
 }
 
-TEST(AsyncWriter, ADiskThatHangsHoldsNobodyUpAndWhatItCostIsCounted) {
+TEST(AsyncWriterThreads, ADiskThatHangsHoldsNobodyUpAndWhatItCostIsCounted) {
   const TempFolder temp;
   AsyncWriter writer(SessionWriter::create(temp / "s", manifest_of({kLayout, kLayout}),
                                            small_disk_options(Encoding::raw_nut))
@@ -204,7 +204,7 @@ TEST(AsyncWriter, ADiskThatHangsHoldsNobodyUpAndWhatItCostIsCounted) {
   EXPECT_EQ(accounted(counts), pushed);
 }
 
-TEST(AsyncWriter, AFrameThatHasWaitedTooLongFillsItsQueueHoweverSmallItIs) {
+TEST(AsyncWriterThreads, AFrameThatHasWaitedTooLongFillsItsQueueHoweverSmallItIs) {
   const TempFolder temp;
   AsyncWriter writer(
       SessionWriter::create(temp / "s", manifest_of({kLayout}), small_disk_options(Encoding::raw_nut))
@@ -226,7 +226,7 @@ TEST(AsyncWriter, AFrameThatHasWaitedTooLongFillsItsQueueHoweverSmallItIs) {
   reading.join();
 }
 
-TEST(AsyncWriter, ASimulationWaitsForRoomAndLosesNothing) {
+TEST(AsyncWriterThreads, ASimulationWaitsForRoomAndLosesNothing) {
   const TempFolder temp;
   AsyncWriter writer(writer_for(temp / "s", 1),
                      {.queue_bytes = kFrameBytes, .queue_time = Seconds(1e-6), .when_full = WhenFull::wait});
@@ -236,7 +236,7 @@ TEST(AsyncWriter, ASimulationWaitsForRoomAndLosesNothing) {
   EXPECT_EQ(manifest->cameras(0).counts().recorded(), 100U);
 }
 
-TEST(AsyncWriter, WhatItCallsSafeASalvageOfACopyFinds) {
+TEST(AsyncWriterThreads, WhatItCallsSafeASalvageOfACopyFinds) {
   for (const Encoding encoding : {Encoding::ffv1, Encoding::raw_nut}) {
     const TempFolder temp;
     AsyncWriter writer(
@@ -254,7 +254,7 @@ TEST(AsyncWriter, WhatItCallsSafeASalvageOfACopyFinds) {
   }
 }
 
-TEST(AsyncWriter, ProgressAddsUpToWhatFinishTells) {
+TEST(AsyncWriterThreads, ProgressAddsUpToWhatFinishTells) {
   const TempFolder temp;
   AsyncWriter writer(writer_for(temp / "s", 2), {.queue_time = kEver});
   for (const std::uint64_t id : {0, 1, 2, 7, 8}) EXPECT_TRUE(writer.push(1, noise_frame(kLayout, id)));
@@ -275,7 +275,7 @@ TEST(AsyncWriter, ProgressAddsUpToWhatFinishTells) {
   EXPECT_EQ(writer.progress(0).counts.recorded(), 0U);
 }
 
-TEST(AsyncWriter, PushesAfterTheEndAreRefused) {
+TEST(AsyncWriterThreads, PushesAfterTheEndAreRefused) {
   const TempFolder temp;
   AsyncWriter writer(writer_for(temp / "s", 1));
   ASSERT_TRUE(writer.push(0, noise_frame(kLayout, 0)));
@@ -283,7 +283,7 @@ TEST(AsyncWriter, PushesAfterTheEndAreRefused) {
   EXPECT_FALSE(writer.push(0, noise_frame(kLayout, 1)));
 }
 
-TEST(AsyncWriter, ThrownAwayUnfinishedLeavesASessionToSalvage) {
+TEST(AsyncWriterThreads, ThrownAwayUnfinishedLeavesASessionToSalvage) {
   const TempFolder temp;
   {
     AsyncWriter writer(writer_for(temp / "s", 2), {.queue_time = kEver});

@@ -167,7 +167,7 @@ TEST(DamagedSession, TornEventsAreRefusedUntilSalvaged) {
   EXPECT_EQ(reader->manifest().state(), v1::Manifest::COMPLETE);  // no frame was lost
 }
 
-TEST(Salvage, LeavesAFinishedSessionAlone) {
+TEST(SalvageThreads, LeavesAFinishedSessionAlone) {
   const TempFolder temp;
   record(temp / "s", kDamagedLayout, 5, small_disk_options());
   const std::string before = bytes_of(manifest_path(temp / "s"));
@@ -177,7 +177,7 @@ TEST(Salvage, LeavesAFinishedSessionAlone) {
   EXPECT_EQ(bytes_of(manifest_path(temp / "s")), before);
 }
 
-TEST(Salvage, OfASessionThatIsStillRecordedIsRefused) {
+TEST(SalvageThreads, OfASessionThatIsStillRecordedIsRefused) {
   const TempFolder temp;
   auto writer = SessionWriter::create(temp / "s", manifest_of({kDamagedLayout}), small_disk_options());
   ASSERT_TRUE(writer);
@@ -186,7 +186,7 @@ TEST(Salvage, OfASessionThatIsStillRecordedIsRefused) {
   EXPECT_NE(report.error().message().find("still being written"), std::string::npos);
 }
 
-TEST(Salvage, OfAWriterThatWentAwayBeforeItsFirstFrame) {
+TEST(SalvageThreads, OfAWriterThatWentAwayBeforeItsFirstFrame) {
   const TempFolder temp;
   {
     ASSERT_TRUE(SessionWriter::create(temp / "s", manifest_of({kDamagedLayout, kDamagedLayout}),
@@ -318,9 +318,9 @@ void expect_a_player_opens(const std::filesystem::path& file) {
   EXPECT_GT(frames, 25) << file;
 }
 
-class KilledRecorder : public testing::TestWithParam<Encoding> {};
+class KilledRecorderThreads : public testing::TestWithParam<Encoding> {};
 
-TEST_P(KilledRecorder, LosesNothingThatItCalledWrittenOfEachOfElevenCameras) {
+TEST_P(KilledRecorderThreads, LosesNothingThatItCalledWrittenOfEachOfElevenCameras) {
   const TempFolder temp;
   void* const shared =
       ::mmap(nullptr, sizeof(Told), PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0);
@@ -362,7 +362,7 @@ TEST_P(KilledRecorder, LosesNothingThatItCalledWrittenOfEachOfElevenCameras) {
   ::munmap(shared, sizeof(Told));
 }
 
-INSTANTIATE_TEST_SUITE_P(Salvage, KilledRecorder, testing::Values(Encoding::ffv1, Encoding::raw_nut));
+INSTANTIATE_TEST_SUITE_P(Salvage, KilledRecorderThreads, testing::Values(Encoding::ffv1, Encoding::raw_nut));
 
 }  // namespace
 }  // namespace emberlock::session

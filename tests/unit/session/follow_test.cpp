@@ -24,7 +24,7 @@ using testing::HasSubstr;
 const ImageLayout kFollowed{{32, 24}, PixelFormat::gray8, 8};
 
 /// A writer of one or more cameras, and a reader behind it.
-class Follow : public testing::TestWithParam<Encoding> {
+class FollowThreads : public testing::TestWithParam<Encoding> {
  protected:
   void begin(std::size_t cameras, std::uint64_t frames_per_segment = 3000) {
     WriterOptions options = small_disk_options(GetParam());
@@ -61,7 +61,7 @@ class Follow : public testing::TestWithParam<Encoding> {
   std::optional<SessionReader> reader_;
 };
 
-TEST_P(Follow, WhatIsWrittenButNotSyncedIsNotThere) {
+TEST_P(FollowThreads, WhatIsWrittenButNotSyncedIsNotThere) {
   begin(1);
   ASSERT_TRUE(advance());
   write(0, 0, 10);
@@ -77,7 +77,7 @@ TEST_P(Follow, WhatIsWrittenButNotSyncedIsNotThere) {
   expect_frame(0, 9);
 }
 
-TEST_P(Follow, EachFrameComesBitForBitSoonAfterItIsSafeOverManySegments) {
+TEST_P(FollowThreads, EachFrameComesBitForBitSoonAfterItIsSafeOverManySegments) {
   begin(2, 7);
   for (std::uint64_t i = 0; i < 60; i += 5) {
     write(0, i, i + 5);
@@ -95,7 +95,7 @@ TEST_P(Follow, EachFrameComesBitForBitSoonAfterItIsSafeOverManySegments) {
   expect_frame(1, 59);
 }
 
-TEST_P(Follow, ATornSegmentCostsItsFrameUntilTheBytesAreThere) {
+TEST_P(FollowThreads, ATornSegmentCostsItsFrameUntilTheBytesAreThere) {
   begin(1);
   write(0, 0, 20);
   ASSERT_TRUE(writer_->sync());
@@ -112,7 +112,7 @@ TEST_P(Follow, ATornSegmentCostsItsFrameUntilTheBytesAreThere) {
   expect_frame(0, 19);
 }
 
-TEST_P(Follow, AnIndexWithFewerFramesThanToldIsAnErrorAndThenGoesOn) {
+TEST_P(FollowThreads, AnIndexWithFewerFramesThanToldIsAnErrorAndThenGoesOn) {
   begin(1);
   write(0, 0, 4);
   ASSERT_TRUE(writer_->sync());
@@ -127,7 +127,7 @@ TEST_P(Follow, AnIndexWithFewerFramesThanToldIsAnErrorAndThenGoesOn) {
   EXPECT_EQ(reader_->stamps(0).size(), 4U);
 }
 
-TEST_P(Follow, ADamagedRecordOfTheIndexIsAnError) {
+TEST_P(FollowThreads, ADamagedRecordOfTheIndexIsAnError) {
   begin(1);
   write(0, 0, 6);
   ASSERT_TRUE(writer_->sync());
@@ -142,7 +142,7 @@ TEST_P(Follow, ADamagedRecordOfTheIndexIsAnError) {
   expect_frame(0, 2);
 }
 
-TEST(FollowOthers, AFinishedSessionIsNoneThatGrows) {
+TEST(FollowOthersThreads, AFinishedSessionIsNoneThatGrows) {
   const TempFolder temp;
   test::record(temp / "s", kFollowed, 3, small_disk_options());
   auto reader = SessionReader::open(temp / "s");
@@ -151,7 +151,7 @@ TEST(FollowOthers, AFinishedSessionIsNoneThatGrows) {
   EXPECT_EQ(SessionReader::follow(temp / "none").error().kind, ErrorKind::bad_input);
 }
 
-INSTANTIATE_TEST_SUITE_P(Encodings, Follow,
+INSTANTIATE_TEST_SUITE_P(Encodings, FollowThreads,
                          testing::Values(Encoding::ffv1, Encoding::raw_nut, Encoding::huffman_nut));
 
 }  // namespace

@@ -94,9 +94,9 @@ std::string record_all(const std::filesystem::path& folder, Encoding encoding, s
   return "";
 }
 
-class FullDisk : public testing::TestWithParam<Encoding> {};
+class FullDiskThreads : public testing::TestWithParam<Encoding> {};
 
-TEST_P(FullDisk, InMidRecordingKeepsWhatIsWrittenFinishesTheManifestAndCountsTheRest) {
+TEST_P(FullDiskThreads, InMidRecordingKeepsWhatIsWrittenFinishesTheManifestAndCountsTheRest) {
   const TempFolder temp;
   const int code = in_a_process([&]() -> std::string {
     if (std::string wrong = mount_small_disk(temp.path(), 5); !wrong.empty()) return wrong;
@@ -108,7 +108,7 @@ TEST_P(FullDisk, InMidRecordingKeepsWhatIsWrittenFinishesTheManifestAndCountsThe
   EXPECT_EQ(code, 0);
 }
 
-TEST_P(FullDisk, ThatHasRoomAgainIsRecordedToInANewSegment) {
+TEST_P(FullDiskThreads, ThatHasRoomAgainIsRecordedToInANewSegment) {
   const TempFolder temp;
   const int code = in_a_process([&]() -> std::string {
     if (std::string wrong = mount_small_disk(temp.path(), 6); !wrong.empty()) return wrong;
@@ -135,7 +135,7 @@ TEST_P(FullDisk, ThatHasRoomAgainIsRecordedToInANewSegment) {
   EXPECT_EQ(code, 0);
 }
 
-TEST_P(FullDisk, FilesThatMayNotGrowAreAsAFullDisk) {
+TEST_P(FullDiskThreads, FilesThatMayNotGrowAreAsAFullDisk) {
   const TempFolder temp;
   const int code = in_a_process([&]() -> std::string {
     std::signal(SIGXFSZ, SIG_IGN);
@@ -147,7 +147,7 @@ TEST_P(FullDisk, FilesThatMayNotGrowAreAsAFullDisk) {
   EXPECT_EQ(code, 0);
 }
 
-TEST(JoinOnAFullDisk, LeavesNothing) {
+TEST(JoinOnAFullDiskThreads, LeavesNothing) {
   const TempFolder temp;
   const auto parts = test::record_parts(temp / "parts", test::three_hosts(), {.frames = 200});  // 3 MB
   std::filesystem::create_directory(temp / "disk");
@@ -162,7 +162,7 @@ TEST(JoinOnAFullDisk, LeavesNothing) {
   EXPECT_EQ(code, 0);
 }
 
-INSTANTIATE_TEST_SUITE_P(Recording, FullDisk, testing::Values(Encoding::ffv1, Encoding::raw_nut));
+INSTANTIATE_TEST_SUITE_P(Recording, FullDiskThreads, testing::Values(Encoding::ffv1, Encoding::raw_nut));
 
 }  // namespace
 }  // namespace emberlock::session

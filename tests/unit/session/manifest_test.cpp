@@ -98,7 +98,7 @@ TEST(Manifest, OfAFolderWithoutOneIsNoSession) {
   EXPECT_NE(read.error().message().find(temp.path().string()), std::string::npos);
 }
 
-TEST(Events, TornAtEveryByteKeepTheEventsBefore) {
+TEST(EventsThreads, TornAtEveryByteKeepTheEventsBefore) {
   std::string whole;
   std::vector<std::size_t> ends{0};
   for (int i = 0; i < 4; ++i) {
@@ -117,7 +117,7 @@ TEST(Events, TornAtEveryByteKeepTheEventsBefore) {
   }
 }
 
-TEST(Events, ALengthBeyondTheFileIsATornEnd) {
+TEST(EventsThreads, ALengthBeyondTheFileIsATornEnd) {
   EXPECT_TRUE(parse_events(std::string_view("\xff\xff\xff\xff\x0f", 5)).events.empty());
   EXPECT_TRUE(
       parse_events(std::string_view("\xff\xff\xff\xff\xff\xff\xff\xff\xff\xff\xff", 11)).events.empty());

@@ -78,7 +78,7 @@ INSTANTIATE_TEST_SUITE_P(Recording, EveryLayout,
 
 const ImageLayout kSmall{{48, 32}, PixelFormat::gray8, 8};
 
-TEST(Recording, FramesOfAFinishedSessionEndWithOutOfData) {
+TEST(RecordingThreads, FramesOfAFinishedSessionEndWithOutOfData) {
   const TempFolder temp;
   record(temp / "s", kSmall, 2, small_disk_options());
   auto reader = SessionReader::open(temp / "s");
@@ -88,7 +88,7 @@ TEST(Recording, FramesOfAFinishedSessionEndWithOutOfData) {
   EXPECT_EQ(past.error().kind, ErrorKind::out_of_data);
 }
 
-TEST(Recording, SegmentsRollByCountAndBySize) {
+TEST(RecordingThreads, SegmentsRollByCountAndBySize) {
   const TempFolder temp;
   WriterOptions options = small_disk_options();
   options.frames_per_segment = 5;
@@ -109,7 +109,7 @@ TEST(Recording, SegmentsRollByCountAndBySize) {
   EXPECT_EQ(reader->manifest().cameras(0).segments_size(), 2);
 }
 
-TEST(Recording, StampsKeepDamagedStatusAndAllThreeClocks) {
+TEST(RecordingThreads, StampsKeepDamagedStatusAndAllThreeClocks) {
   const TempFolder temp;
   auto writer = SessionWriter::create(temp / "s", manifest_of({kSmall}), small_disk_options());
   ASSERT_TRUE(writer);
@@ -123,7 +123,7 @@ TEST(Recording, StampsKeepDamagedStatusAndAllThreeClocks) {
   EXPECT_EQ(reader->stamps(0).at(0), frame.stamp);
 }
 
-TEST(Recording, AClockThatJumpsBackCostsNoFrame) {
+TEST(RecordingThreads, AClockThatJumpsBackCostsNoFrame) {
   const TempFolder temp;
   auto writer = SessionWriter::create(temp / "s", manifest_of({kSmall}), small_disk_options());
   ASSERT_TRUE(writer);
@@ -142,7 +142,7 @@ TEST(Recording, AClockThatJumpsBackCostsNoFrame) {
   }
 }
 
-TEST(Recording, EventsComeBackInOrder) {
+TEST(RecordingThreads, EventsComeBackInOrder) {
   const TempFolder temp;
   auto writer = SessionWriter::create(temp / "s", manifest_of({kSmall}), small_disk_options());
   ASSERT_TRUE(writer);
@@ -162,7 +162,7 @@ TEST(Recording, EventsComeBackInOrder) {
   EXPECT_EQ(reader->events()[2].what_case(), v1::Event::WHAT_NOT_SET);
 }
 
-TEST(Recording, CountsAddUp) {
+TEST(RecordingThreads, CountsAddUp) {
   const TempFolder temp;
   auto writer = SessionWriter::create(temp / "s", manifest_of({kSmall, kSmall}), small_disk_options());
   ASSERT_TRUE(writer);
@@ -179,7 +179,7 @@ TEST(Recording, CountsAddUp) {
   EXPECT_EQ(manifest->cameras(1).counts().recorded(), 0U);
 }
 
-TEST(Recording, FramesThatNobodyWantedAreNoGap) {
+TEST(RecordingThreads, FramesThatNobodyWantedAreNoGap) {
   const TempFolder temp;
   auto writer = SessionWriter::create(temp / "s", manifest_of({kSmall}), small_disk_options());
   ASSERT_TRUE(writer);
@@ -191,7 +191,7 @@ TEST(Recording, FramesThatNobodyWantedAreNoGap) {
   EXPECT_EQ(manifest->cameras(0).counts().camera_gap(), 1U);
 }
 
-TEST(Recording, CountsThatContradictAreAnErrorAndTheSessionStaysUnfinished) {
+TEST(RecordingThreads, CountsThatContradictAreAnErrorAndTheSessionStaysUnfinished) {
   const TempFolder temp;
   auto writer = SessionWriter::create(temp / "s", manifest_of({kSmall}), small_disk_options());
   ASSERT_TRUE(writer);
@@ -203,7 +203,7 @@ TEST(Recording, CountsThatContradictAreAnErrorAndTheSessionStaysUnfinished) {
   EXPECT_FALSE(SessionReader::open(temp / "s"));
 }
 
-TEST(Recording, AnIndexCutBehindTheWritersBackIsFoundAtTheEnd) {
+TEST(RecordingThreads, AnIndexCutBehindTheWritersBackIsFoundAtTheEnd) {
   const TempFolder temp;
   auto writer = SessionWriter::create(temp / "s", manifest_of({kSmall}), small_disk_options());
   ASSERT_TRUE(writer);
@@ -212,7 +212,7 @@ TEST(Recording, AnIndexCutBehindTheWritersBackIsFoundAtTheEnd) {
   EXPECT_FALSE(writer->finish());
 }
 
-TEST(Recording, BelowTheFloorOfFreeSpaceFramesAreRefusedAndCounted) {
+TEST(RecordingThreads, BelowTheFloorOfFreeSpaceFramesAreRefusedAndCounted) {
   const TempFolder temp;
   WriterOptions options;
   options.min_free_bytes = std::uint64_t{1} << 60;
@@ -229,7 +229,7 @@ TEST(Recording, BelowTheFloorOfFreeSpaceFramesAreRefusedAndCounted) {
   EXPECT_EQ(manifest->cameras(0).counts().recorded(), 0U);
 }
 
-TEST(Recording, AFrameOfAnotherLayoutIsRefused) {
+TEST(RecordingThreads, AFrameOfAnotherLayoutIsRefused) {
   const TempFolder temp;
   auto writer = SessionWriter::create(temp / "s", manifest_of({kSmall}), small_disk_options());
   ASSERT_TRUE(writer);
@@ -239,7 +239,7 @@ TEST(Recording, AFrameOfAnotherLayoutIsRefused) {
   EXPECT_FALSE(writer->write(0, Frame{}));
 }
 
-TEST(Recording, IntoAFolderThatHoldsSomethingIsRefused) {
+TEST(RecordingThreads, IntoAFolderThatHoldsSomethingIsRefused) {
   const TempFolder temp;
   std::filesystem::create_directory(temp / "s");
   test::put_bytes(temp / "s" / "thesis.tex", "years of work");
@@ -250,7 +250,7 @@ TEST(Recording, IntoAFolderThatHoldsSomethingIsRefused) {
 }
 
 /// Whatever refuses it, there is no folder afterwards that there wasn't before.
-TEST(Recording, ThatIsRefusedLeavesNothing) {
+TEST(RecordingThreads, ThatIsRefusedLeavesNothing) {
   const TempFolder temp;
   v1::Manifest wordy = manifest_of({kSmall});
   wordy.set_purpose(std::string(3'900'000, 'x'));
@@ -270,7 +270,7 @@ TEST(Recording, ThatIsRefusedLeavesNothing) {
   EXPECT_TRUE(std::filesystem::is_empty(temp / "sessions/s")) << "what was there before stays, as it was";
 }
 
-TEST(Recording, ASingleRowOfPixelsIsRefusedBeforeAnythingIsCreated) {
+TEST(RecordingThreads, ASingleRowOfPixelsIsRefusedBeforeAnythingIsCreated) {
   const TempFolder temp;
   const auto writer = SessionWriter::create(temp / "s", manifest_of({{{64, 1}, PixelFormat::gray8, 8}}),
                                             small_disk_options());
@@ -279,7 +279,7 @@ TEST(Recording, ASingleRowOfPixelsIsRefusedBeforeAnythingIsCreated) {
   EXPECT_FALSE(std::filesystem::exists(temp / "s"));
 }
 
-TEST(Recording, CameraIdsThatCannotNameAFolderAreRefused) {
+TEST(RecordingThreads, CameraIdsThatCannotNameAFolderAreRefused) {
   const TempFolder temp;
   for (const std::string id : {"", "..", "a/b", "/etc", ".hidden", "new\nline"}) {
     v1::Manifest manifest = manifest_of({kSmall});
@@ -294,7 +294,7 @@ TEST(Recording, CameraIdsThatCannotNameAFolderAreRefused) {
   EXPECT_FALSE(SessionWriter::create(temp / "s", twice, small_disk_options()));
 }
 
-TEST(Recording, TranscodingRawKeepsEveryPixelAndDropsTheRawFiles) {
+TEST(RecordingThreads, TranscodingRawKeepsEveryPixelAndDropsTheRawFiles) {
   const TempFolder temp;
   const ImageLayout layout{{33, 17}, PixelFormat::rgb16, 12};
   WriterOptions options = small_disk_options(Encoding::raw_nut);
@@ -314,7 +314,7 @@ TEST(Recording, TranscodingRawKeepsEveryPixelAndDropsTheRawFiles) {
   }
 }
 
-TEST(Recording, TranscodingADamagedRawSegmentKeepsIt) {
+TEST(RecordingThreads, TranscodingADamagedRawSegmentKeepsIt) {
   const TempFolder temp;
   record(temp / "s", kSmall, 5, small_disk_options(Encoding::raw_nut));
   std::string bytes = test::bytes_of(temp / "s/cam0/000000.nut");

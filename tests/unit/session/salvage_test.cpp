@@ -71,9 +71,9 @@ std::string outcome_of(const std::filesystem::path& folder) {
   return all;
 }
 
-class SalvageCutShort : public testing::Test {
+class SalvageCutShortThreads : public testing::Test {
  protected:
-  SalvageCutShort() {
+  SalvageCutShortThreads() {
     leave_killed(temp_ / "s");
     std::filesystem::copy(temp_ / "s", temp_ / "whole", std::filesystem::copy_options::recursive);
     std::atomic<int> asked = 0;
@@ -104,7 +104,7 @@ class SalvageCutShort : public testing::Test {
   int questions_ = 0;
 };
 
-TEST_F(SalvageCutShort, KeepsWhatLiesBehindAHoleAndCountsTheRest) {
+TEST_F(SalvageCutShortThreads, KeepsWhatLiesBehindAHoleAndCountsTheRest) {
   ASSERT_EQ(whole_.cameras.size(), kSalvagedCameras);
   EXPECT_GT(whole_.cameras[0].lost, 3U);
   EXPECT_GE(whole_.cameras[1].lost, 1U);
@@ -123,7 +123,7 @@ TEST_F(SalvageCutShort, KeepsWhatLiesBehindAHoleAndCountsTheRest) {
   EXPECT_TRUE(check->whole()) << check->to_do;
 }
 
-TEST_F(SalvageCutShort, ByTheObserverAtAnyQuestionItIsTakenUpWithTheSameOutcome) {
+TEST_F(SalvageCutShortThreads, ByTheObserverAtAnyQuestionItIsTakenUpWithTheSameOutcome) {
   ASSERT_GT(questions_, 50);
   for (int after = 0; after < questions_; ++after) {
     const auto folder = again();
@@ -136,7 +136,7 @@ TEST_F(SalvageCutShort, ByTheObserverAtAnyQuestionItIsTakenUpWithTheSameOutcome)
   }
 }
 
-using SalvageCutShortSlow = SalvageCutShort;
+using SalvageCutShortSlow = SalvageCutShortThreads;
 TEST_F(SalvageCutShortSlow, ByAKillAtAnyQuestionItIsTakenUpWithTheSameOutcome) {
   for (int after = 0; after < questions_; after += 3) {
     const auto folder = again();
@@ -156,7 +156,7 @@ TEST_F(SalvageCutShortSlow, ByAKillAtAnyQuestionItIsTakenUpWithTheSameOutcome) {
   }
 }
 
-TEST_F(SalvageCutShort, BetweenTheManifestAndAnIndexItStillKnowsWhatWasLost) {
+TEST_F(SalvageCutShortThreads, BetweenTheManifestAndAnIndexItStillKnowsWhatWasLost) {
   const auto folder = again();
   ASSERT_TRUE(salvage(folder));
   // As if it had been killed when the manifest told of all cameras, and one index was still the old one.
@@ -172,7 +172,7 @@ TEST_F(SalvageCutShort, BetweenTheManifestAndAnIndexItStillKnowsWhatWasLost) {
 }
 
 // While one sync goes from the data to the index, the recorder may have ended a segment and begun the next.
-TEST(Salvage, APowerCutOnTheChangeOfSegmentsLeavesNoFrameThatCantBeRead) {
+TEST(SalvageThreads, APowerCutOnTheChangeOfSegmentsLeavesNoFrameThatCantBeRead) {
   const TempFolder temp;
   WriterOptions options = small_disk_options(Encoding::ffv1);
   options.frames_per_segment = 20;
@@ -257,7 +257,7 @@ std::vector<std::pair<std::size_t, std::size_t>> coded_frames(const std::filesys
 }
 
 // A hole that a power cut left. Of eight zeros a slice's checksum would be right.
-TEST(Salvage, AFrameOfZerosIsntWhole) {
+TEST(SalvageThreads, AFrameOfZerosIsntWhole) {
   const TempFolder temp;
   test::record(temp / "s", kSalvagedLayout, 60, small_disk_options(Encoding::ffv1));
   const auto index = read_index(temp / "s", "cam0");

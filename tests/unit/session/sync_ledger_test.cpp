@@ -40,9 +40,9 @@ struct Disk {
   }
 };
 
-class SyncLedgerTest : public ::testing::Test {
+class SyncLedgerThreads : public ::testing::Test {
  protected:
-  SyncLedgerTest()
+  SyncLedgerThreads()
       : ledger_(create("index.bin"), temp_ / "index.bin", {temp_ / "."}, &Disk::flush),
         segment_(create("a.nut")) {
     Disk::refuses.clear();
@@ -59,14 +59,14 @@ class SyncLedgerTest : public ::testing::Test {
   UniqueFd segment_;
 };
 
-TEST_F(SyncLedgerTest, WhatWasHandedOnIsSafeAfterASync) {
+TEST_F(SyncLedgerThreads, WhatWasHandedOnIsSafeAfterASync) {
   ledger_.handed(5);
   EXPECT_EQ(ledger_.safe(), 0);
   ASSERT_TRUE(ledger_.sync().ok());
   EXPECT_EQ(ledger_.safe(), 5);
 }
 
-TEST_F(SyncLedgerTest, FramesThatACutLeavesAreSafeOnlyWhenTheirSegmentIsOnTheDisk) {
+TEST_F(SyncLedgerThreads, FramesThatACutLeavesAreSafeOnlyWhenTheirSegmentIsOnTheDisk) {
   ledger_.handed(5);
   ASSERT_TRUE(ledger_.sync().ok());
   ledger_.handed(9);
@@ -79,7 +79,7 @@ TEST_F(SyncLedgerTest, FramesThatACutLeavesAreSafeOnlyWhenTheirSegmentIsOnTheDis
   EXPECT_EQ(ledger_.waiting(), 0);
 }
 
-TEST_F(SyncLedgerTest, FramesThatACutLeavesArentSafeWhereTheDiskRefusesThem) {
+TEST_F(SyncLedgerThreads, FramesThatACutLeavesArentSafeWhereTheDiskRefusesThem) {
   ledger_.handed(9);
   ledger_.cut(8);
   refuse_the_segment();
@@ -87,7 +87,7 @@ TEST_F(SyncLedgerTest, FramesThatACutLeavesArentSafeWhereTheDiskRefusesThem) {
   EXPECT_EQ(ledger_.safe(), 0);
 }
 
-TEST_F(SyncLedgerTest, ASecondTryAfterAFailedSyncProvesNothing) {
+TEST_F(SyncLedgerThreads, ASecondTryAfterAFailedSyncProvesNothing) {
   ledger_.handed(5);
   ASSERT_TRUE(ledger_.sync().ok());
   ledger_.handed(9);
@@ -106,7 +106,7 @@ TEST_F(SyncLedgerTest, ASecondTryAfterAFailedSyncProvesNothing) {
   EXPECT_EQ(ledger_.handed(), 5);
 }
 
-TEST_F(SyncLedgerTest, TheErrorOfASegmentThatWasCutOffMeanwhileIsForgotten) {
+TEST_F(SyncLedgerThreads, TheErrorOfASegmentThatWasCutOffMeanwhileIsForgotten) {
   ledger_.handed(5);
   refuse_the_segment();
   const UniqueFd next = create("b.nut");
@@ -121,7 +121,7 @@ TEST_F(SyncLedgerTest, TheErrorOfASegmentThatWasCutOffMeanwhileIsForgotten) {
   EXPECT_EQ(ledger_.safe(), 2);
 }
 
-TEST_F(SyncLedgerTest, AnIndexThatTheDiskRefusesMakesNothingSafe) {
+TEST_F(SyncLedgerThreads, AnIndexThatTheDiskRefusesMakesNothingSafe) {
   ledger_.handed(5);
   Disk::refuses.insert([&] {
     struct stat info {};

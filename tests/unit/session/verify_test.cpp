@@ -67,9 +67,9 @@ void expect_all_good(const std::filesystem::path& folder) {
   }
 }
 
-class VerifyBoth : public testing::TestWithParam<Encoding> {};
+class VerifyBothThreads : public testing::TestWithParam<Encoding> {};
 
-TEST_P(VerifyBoth, FindsNothingInAWholeSessionAndRepairLeavesItAlone) {
+TEST_P(VerifyBothThreads, FindsNothingInAWholeSessionAndRepairLeavesItAlone) {
   const TempFolder temp;
   record_two(temp / "s", GetParam());
   const SessionCheck check = verified(temp / "s");
@@ -84,7 +84,7 @@ TEST_P(VerifyBoth, FindsNothingInAWholeSessionAndRepairLeavesItAlone) {
   EXPECT_EQ(bytes_of(manifest_path(temp / "s")), manifest);
 }
 
-TEST_P(VerifyBoth, NamesTheDamagedSegmentAndRepairKeepsItsOtherFrames) {
+TEST_P(VerifyBothThreads, NamesTheDamagedSegmentAndRepairKeepsItsOtherFrames) {
   const TempFolder temp;
   record_two(temp / "s", GetParam());
   const auto segment = find_segment(temp / "s", "cam1", 1);
@@ -112,7 +112,7 @@ TEST_P(VerifyBoth, NamesTheDamagedSegmentAndRepairKeepsItsOtherFrames) {
   EXPECT_EQ(manifest->cameras(1).counts().disk(), 1U);
 }
 
-TEST_P(VerifyBoth, AMissingSegmentCostsItsFramesAndIsNamed) {
+TEST_P(VerifyBothThreads, AMissingSegmentCostsItsFramesAndIsNamed) {
   const TempFolder temp;
   record_two(temp / "s", GetParam());
   std::filesystem::remove(find_segment(temp / "s", "cam0", 2));
@@ -126,9 +126,9 @@ TEST_P(VerifyBoth, AMissingSegmentCostsItsFramesAndIsNamed) {
   expect_all_good(temp / "s");
 }
 
-INSTANTIATE_TEST_SUITE_P(Session, VerifyBoth, testing::Values(Encoding::ffv1, Encoding::raw_nut));
+INSTANTIATE_TEST_SUITE_P(Session, VerifyBothThreads, testing::Values(Encoding::ffv1, Encoding::raw_nut));
 
-TEST(Verify, ADamagedIndexCostsNoFrame) {
+TEST(VerifyThreads, ADamagedIndexCostsNoFrame) {
   const TempFolder temp;
   record_two(temp / "s");
   flip(index_path(temp / "s", "cam0"), 3);
@@ -148,7 +148,7 @@ TEST(Verify, ADamagedIndexCostsNoFrame) {
   expect_all_good(temp / "s");
 }
 
-TEST(Verify, NeverCallsNothingAllThere) {
+TEST(VerifyThreads, NeverCallsNothingAllThere) {
   const TempFolder temp;
   auto writer = SessionWriter::create(temp / "none", manifest_of({kVerifiedLayout, kVerifiedLayout}),
                                       small_disk_options());
@@ -183,7 +183,7 @@ TEST(Verify, NeverCallsNothingAllThere) {
   EXPECT_FALSE(verified(temp / "gone").whole());
 }
 
-TEST(Verify, TornEventsAListOfOtherSegmentsAndWrongCountsAreFound) {
+TEST(VerifyThreads, TornEventsAListOfOtherSegmentsAndWrongCountsAreFound) {
   const TempFolder temp;
   record_two(temp / "s");
   std::filesystem::resize_file(events_path(temp / "s"),
@@ -203,7 +203,7 @@ TEST(Verify, TornEventsAListOfOtherSegmentsAndWrongCountsAreFound) {
   EXPECT_EQ(read_manifest(temp / "s")->cameras(1).counts().disk(), 3U);
 }
 
-TEST(Verify, OfASessionInRecordingSaysSoAndRepairWaitsForItsRecorder) {
+TEST(VerifyThreads, OfASessionInRecordingSaysSoAndRepairWaitsForItsRecorder) {
   const TempFolder temp;
   auto writer = SessionWriter::create(temp / "s", manifest_of({kVerifiedLayout}), small_disk_options());
   ASSERT_TRUE(writer);
@@ -222,7 +222,7 @@ TEST(Verify, OfASessionInRecordingSaysSoAndRepairWaitsForItsRecorder) {
   expect_all_good(temp / "s");
 }
 
-TEST(Verify, EndedAtAnyPointRepairLeavesNoFrameWorseAndIsTakenUpAgain) {
+TEST(VerifyThreads, EndedAtAnyPointRepairLeavesNoFrameWorseAndIsTakenUpAgain) {
   const TempFolder temp;
   record_two(temp / "whole");
   flip_in_the_middle(find_segment(temp / "whole", "cam0", 1));
@@ -251,7 +251,7 @@ TEST(Verify, EndedAtAnyPointRepairLeavesNoFrameWorseAndIsTakenUpAgain) {
   EXPECT_GT(steps, 20);
 }
 
-TEST(Verify, CanBeEnded) {
+TEST(VerifyThreads, CanBeEnded) {
   const TempFolder temp;
   record_two(temp / "s");
   const auto ended = verify_session(temp / "s", [](double, std::string_view) { return false; });
@@ -260,7 +260,7 @@ TEST(Verify, CanBeEnded) {
   EXPECT_EQ(verify_session(temp / "nothing").error().kind, ErrorKind::bad_input);
 }
 
-TEST(Transcode, CutShortAnywhereIsTakenUpAgain) {
+TEST(TranscodeThreads, CutShortAnywhereIsTakenUpAgain) {
   const TempFolder temp;
   record_two(temp / "raw", Encoding::raw_nut);
   int end_at = 0;

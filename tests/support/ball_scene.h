@@ -6,6 +6,7 @@
 
 #include "base/random.h"
 #include "recon/synthetic/flame.h"
+#include "tests/support/pictures.h"
 
 namespace emberlock {
 
@@ -40,24 +41,17 @@ inline recon::Scene ball_scene(const BallOptions& o) {
                                     middle + from, middle),
                      {},
                      held_out ? recon::ViewRole::held_out : recon::ViewRole::input};
-    recon::RadianceImage image(o.image);
-    for (int y = 0; y < o.image.height; ++y)
-      for (int x = 0; x < o.image.width; ++x) {
-        const Eigen::Vector3d along = view.camera.ray({x + 0.5, y + 0.5}).direction.normalized();
-        const double nearest = from.squaredNorm() - std::pow(from.dot(along), 2);
-        const double light = 200 * std::exp(-nearest / (2 * sigma * sigma));
-        const std::size_t at = 3 * static_cast<std::size_t>(y * o.image.width + x);
-        for (std::size_t c = 0; c < 3; ++c) {
-          double sum = 0;  // of four uniform numbers: nearly Gaussian
-          const std::uint64_t bits =
-              o.noise > 0 ? random_bits(o.seed, static_cast<std::uint64_t>(v), at + c) : 0;
-          for (int word = 0; word < 4; ++word) sum += static_cast<double>(bits >> (16 * word) & 0xffff);
-          const double noise = o.noise > 0 ? 2.55 * o.noise * (sum - 131070) / 37837.2 : 0;
-          image.rgb[at + c] =
-              static_cast<float>(std::max(0.0, (1 - 0.2 * static_cast<double>(c)) * light + noise));
-        }
-      }
-    view.image = recon::share(std::move(image));
+    view.image = recon::share(radiance_of(o.image, [&](int x, int y, int c) {
+      const Eigen::Vector3d along = view.camera.ray({x + 0.5, y + 0.5}).direction.normalized();
+      const double nearest = from.squaredNorm() - std::pow(from.dot(along), 2);
+      const double light = (1 - 0.2 * c) * 200 * std::exp(-nearest / (2 * sigma * sigma));
+      if (!(o.noise > 0)) return light;
+      const auto at = static_cast<std::uint64_t>(3 * (y * o.image.width + x) + c);
+      const std::uint64_t bits = random_bits(o.seed, static_cast<std::uint64_t>(v), at);
+      double sum = 0;  // of four uniform numbers: nearly Gaussian
+      for (int word = 0; word < 4; ++word) sum += static_cast<double>(bits >> (16 * word) & 0xffff);
+      return std::max(0.0, light + 2.55 * o.noise * (sum - 131070) / 37837.2);
+    }));
     scene.views.push_back(std::move(view));
   }
   return scene;

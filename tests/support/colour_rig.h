@@ -11,6 +11,7 @@
 #include "base/square.h"
 #include "recon/preprocess/colour_calibration.h"
 #include "recon/preprocess/develop.h"
+#include "tests/support/pictures.h"
 
 namespace emberlock::test {
 
@@ -71,15 +72,13 @@ inline std::vector<ColourTruth> colour_rig(std::size_t cameras, std::uint64_t se
 inline recon::PatchReading film_patch(const ColourTruth& camera, const std::array<double, 3>& radiance,
                                       double exposure, double x, double y, RandomStream& random) {
   constexpr int kEdge = 24;
-  Image tile(ImageLayout{{kEdge, kEdge}, PixelFormat::rgb8, 8});
-  for (int v = 0; v < kEdge; ++v)
-    for (int u = 0; u < kEdge; ++u)
-      for (std::size_t c = 0; c < 3; ++c) {
-        const double light =
-            camera.exposure(radiance[c] * exposure, c, x + u - 0.5 * kEdge + 0.5, y + v - 0.5 * kEdge + 0.5);
-        tile.row_as<std::uint8_t>(v)[3 * u + static_cast<int>(c)] =
-            static_cast<std::uint8_t>(noisy_sample(camera, light, random));
-      }
+  const Image tile = image_of({{kEdge, kEdge}, PixelFormat::rgb8, 8}, [&](int u, int v, int c) {
+    const auto channel = static_cast<std::size_t>(c);
+    return noisy_sample(camera,
+                        camera.exposure(radiance[channel] * exposure, channel, x + u - 0.5 * kEdge + 0.5,
+                                        y + v - 0.5 * kEdge + 0.5),
+                        random);
+  });
   recon::PatchReading reading = recon::read_patch(tile.view(), {0, 0, kEdge, kEdge});
   reading.exposure = exposure;
   reading.x = x;
@@ -109,13 +108,10 @@ inline void put_dust(ColourTruth& camera, std::uint64_t seed) {
 /// A grey surface, out of focus, that fills the picture.
 inline Image film_flat(const ColourTruth& camera, RandomStream& random) {
   constexpr double kRadiance = 0.5;
-  Image picture(ImageLayout{camera.size, PixelFormat::rgb8, 8});
-  for (int y = 0; y < camera.size.height; ++y)
-    for (int x = 0; x < camera.size.width; ++x)
-      for (std::size_t c = 0; c < 3; ++c)
-        picture.row_as<std::uint8_t>(y)[3 * static_cast<std::size_t>(x) + c] = static_cast<std::uint8_t>(
-            noisy_sample(camera, camera.exposure(kRadiance, c, x + 0.5, y + 0.5), random));
-  return picture;
+  return image_of({camera.size, PixelFormat::rgb8, 8}, [&](int x, int y, int c) {
+    return noisy_sample(camera, camera.exposure(kRadiance, static_cast<std::size_t>(c), x + 0.5, y + 0.5),
+                        random);
+  });
 }
 
 struct TargetOptions {
@@ -209,7 +205,6 @@ inline PatchSpread held_out_spread(const std::vector<ColourTruth>& rig,
     const int width = camera.size.width;
     const int height = camera.size.height;
     const int edge = std::min(30, width / 20);  // half of the picture stays black
-    Image frame(ImageLayout{camera.size, PixelFormat::rgb8, 8});
     const auto patch_at = [&](int x, int y) -> int {
       const int column = x * kAcross / width;
       const int row = y * kDown / height;
@@ -218,17 +213,14 @@ inline PatchSpread held_out_spread(const std::vector<ColourTruth>& rig,
       if (std::abs(dx) > edge || std::abs(dy) > edge) return -1;
       return (row * kAcross + column + 5 * static_cast<int>(i)) % (kAcross * kDown);
     };
-    for (int y = 0; y < height; ++y)
-      for (int x = 0; x < width; ++x)
-        for (int c = 0; c < 3; ++c) {
+    recon::CameraFrame from;
+    from.frame =
+        std::make_shared<const Image>(image_of({camera.size, PixelFormat::rgb8, 8}, [&](int x, int y, int c) {
           const int p = patch_at(x, y);
           const auto channel = static_cast<std::size_t>(c);
           const double radiance = p < 0 ? 0 : patches[static_cast<std::size_t>(p)][channel];
-          frame.row_as<std::uint8_t>(y)[3 * x + c] = static_cast<std::uint8_t>(
-              noisy_sample(camera, camera.exposure(radiance, channel, x + 0.5, y + 0.5), random));
-        }
-    recon::CameraFrame from;
-    from.frame = std::make_shared<const Image>(std::move(frame));
+          return noisy_sample(camera, camera.exposure(radiance, channel, x + 0.5, y + 0.5), random);
+        }));
     from.sensor = SensorKind::global_shutter;
     if (calibration != nullptr) from.colour = calibration->cameras[i].colour;
     const recon::DevelopedPicture picture = recon::develop(from);

@@ -16,6 +16,7 @@
 #include "recon/preprocess/samples.h"
 #include "recon/preprocess/smear.h"
 #include "recon/synthetic/flame.h"
+#include "tests/support/pictures.h"
 
 // A synthetic flame as sensors film it: what preparing the pictures is judged by.
 namespace emberlock::test {
@@ -42,31 +43,21 @@ struct FilmOptions {
 
 /// 8-bit samples of a picture; the same seed makes the same noise.
 inline Image film(const recon::RadianceImage& picture, const FilmOptions& options, std::uint64_t seed) {
-  Image image(ImageLayout{picture.size, options.format, 8});
-  const int channels = emberlock::channels(options.format);
-  std::uint64_t at = 0;
-  for (int y = 0; y < picture.size.height; ++y) {
-    for (int x = 0; x < picture.size.width; ++x) {
-      const auto pixel = static_cast<std::size_t>(y) * static_cast<std::size_t>(picture.size.width) +
-                         static_cast<std::size_t>(x);
-      const double hot =
-          std::binary_search(options.hot.begin(), options.hot.end(), static_cast<std::uint32_t>(pixel))
-              ? options.hot_level
-              : 0;
-      for (int c = 0; c < channels; ++c, ++at) {
-        const int seen = is_bayer(options.format) ? recon::mosaic_channel(x, y) : channels == 3 ? c : 1;
-        double v =
-            options.level +
-            options.gain * static_cast<double>(picture.rgb[3 * pixel + static_cast<std::size_t>(seen)]) + hot;
-        if (!options.background.empty()) v += options.background[pixel];
-        if (!options.smear.empty()) v += options.smear[static_cast<std::size_t>(x)];
-        v += options.noise * random_normal(seed, 7, at);
-        image.row_as<std::uint8_t>(y)[x * channels + c] =
-            static_cast<std::uint8_t>(std::clamp(std::lround(v), 0L, 255L));
-      }
-    }
-  }
-  return image;
+  const int width = picture.size.width;
+  const int n = channels(options.format);
+  return image_of({picture.size, options.format, 8}, [&](int x, int y, int c) {
+    const auto pixel =
+        static_cast<std::size_t>(y) * static_cast<std::size_t>(width) + static_cast<std::size_t>(x);
+    const int seen = is_bayer(options.format) ? recon::mosaic_channel(x, y) : n == 3 ? c : 1;
+    double v = options.level +
+               options.gain * static_cast<double>(picture.rgb[3 * pixel + static_cast<std::size_t>(seen)]);
+    if (std::ranges::binary_search(options.hot, static_cast<std::uint32_t>(pixel))) v += options.hot_level;
+    if (!options.background.empty()) v += options.background[pixel];
+    if (!options.smear.empty()) v += options.smear[static_cast<std::size_t>(x)];
+    v += options.noise *
+         random_normal(seed, 7, static_cast<std::uint64_t>(n) * pixel + static_cast<std::uint64_t>(c));
+    return std::clamp(std::lround(v), 0L, 255L);
+  });
 }
 
 /// What a sensor's columns hold of a picture's light, the mean of the channels it has at each pixel.

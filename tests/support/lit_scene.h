@@ -9,6 +9,7 @@
 #include "recon/render/lit_medium.h"
 #include "recon/render/render.h"
 #include "recon/synthetic/flame.h"
+#include "tests/support/key_points.h"
 
 namespace emberlock::test {
 
@@ -33,27 +34,20 @@ inline double spread(int n, int seed) {
 }
 
 inline LitTruth lit_truth(const LitScene& options, const recon::Light& light) {
-  const recon::Grid g =
-      recon::grid_over({Eigen::Vector3d::Zero(), Eigen::Vector3d::Constant(0.2)}, options.truth_voxels);
+  const recon::Grid g = cube_grid(0.2, options.truth_voxels);
   LitTruth truth{{g, std::vector<float>(3 * g.size()), std::vector<float>(g.size())}, recon::whole_grid(g)};
   constexpr int kPuffs = 5;
   constexpr double kWidth = 0.021;  // standard deviation, metres
-  for (std::size_t p = 0; p < g.size(); ++p) {
-    const auto row = static_cast<std::size_t>(g.nx);
-    const Eigen::Vector3d at =
-        Eigen::Vector3d(g.origin[0], g.origin[1], g.origin[2]) +
-        static_cast<double>(g.edge) * Eigen::Vector3d(static_cast<double>(p % row),
-                                                      static_cast<double>(p / row % row),
-                                                      static_cast<double>(p / row / row));
+  each_point(g, [&](int i, int j, int k, std::size_t p) {
     double sigma = 0;
     for (int n = 0; n < kPuffs; ++n) {
       const double turn = 2 * std::numbers::pi * spread(n, options.seed);
       const Eigen::Vector3d middle(0.035 * std::cos(turn), 0.035 * std::sin(turn), 0.024 * (n - 2));
-      sigma += std::exp(-(at - middle).squaredNorm() / (2 * kWidth * kWidth));
+      sigma += std::exp(-(place_of(g, i, j, k) - middle).squaredNorm() / (2 * kWidth * kWidth));
     }
     sigma = std::max(0.0, sigma - 0.05) * options.depth / (kWidth * std::sqrt(2 * std::numbers::pi));
     truth.volume.extinction[p] = static_cast<float>(sigma);
-  }
+  });
   recon::Pool pool(1);
   std::vector<recon::Rgba> medium(g.size());
   for (std::size_t p = 0; p < g.size(); ++p) medium[p].c[3] = g.edge * truth.volume.extinction[p];

@@ -12,7 +12,9 @@
 #include "recon/hull/hull.h"
 #include "recon/kernels/phase_function.h"
 #include "recon/kernels/rgba.h"
+#include "recon/render/in_scatter.h"
 #include "recon/render/volume.h"
+#include "tests/support/key_points.h"
 
 // Scattering scenes for tests, and the oracle that knows their light.
 
@@ -26,17 +28,22 @@ inline recon::Effects scattering(PerMeter extinction, Order order, double albedo
   return e;
 }
 
+/// The volume's own extinction scatters.
+inline recon::Effects scattering_field(Order order, double albedo, double asymmetry = 0) {
+  recon::Effects e;
+  e.extinction.model = recon::Extinction::Model::field;
+  e.scattering = {order, albedo, asymmetry};
+  return e;
+}
+
+/// In a medium of all of the volume's voxels.
+inline recon::ScatterField scatter_field(const recon::Volume& volume, const recon::Effects& effects,
+                                         recon::Pool& pool, const recon::InScatterOptions& options = {}) {
+  return recon::find_in_scatter(volume, recon::whole_grid(volume.grid), effects, options, pool);
+}
+
 inline recon::Volume uniform_volume(const recon::Grid& grid, float emission) {
   return {grid, std::vector<float>(3 * grid.size(), emission), {}};
-}
-
-inline recon::Grid cube(int voxels, double size = 0.2) {
-  return recon::grid_over({Eigen::Vector3d::Zero(), Eigen::Vector3d::Constant(size)}, voxels);
-}
-
-inline Eigen::Vector3d place(const recon::Grid& g, int i, int j, int k) {
-  return Eigen::Vector3d(g.origin[0], g.origin[1], g.origin[2]) +
-         static_cast<double>(g.edge) * Eigen::Vector3d(i, j, k);
 }
 
 inline double green(const std::vector<recon::Rgba>& v, std::size_t at) {
@@ -51,25 +58,22 @@ inline double greatest(const std::vector<recon::Rgba>& v) {
 
 /// Two soft, coloured blobs of light in a soft cloud off their middle.
 inline recon::Volume cloud(int voxels, double thickest) {
-  const recon::Grid grid = cube(voxels);
+  const recon::Grid grid = cube_grid(0.2, voxels);
   recon::Volume v = uniform_volume(grid, 0);
   v.extinction.resize(grid.size());
   const auto blob = [](const Eigen::Vector3d& d, double width) {
     return std::exp(-d.squaredNorm() / (2 * width * width));
   };
-  for (int k = 0; k < grid.nz; ++k)
-    for (int j = 0; j < grid.ny; ++j)
-      for (int i = 0; i < grid.nx; ++i) {
-        const Eigen::Vector3d p = place(grid, i, j, k);
-        const std::size_t at = grid.index(i, j, k);
-        const double a = blob(p - Eigen::Vector3d(0.03, -0.02, -0.02), 0.03);
-        const double b = blob(p - Eigen::Vector3d(-0.04, 0.03, 0.03), 0.04);
-        v.emission[3 * at] = static_cast<float>(3000 * a);
-        v.emission[3 * at + 1] = static_cast<float>(2000 * a + 500 * b);
-        v.emission[3 * at + 2] = static_cast<float>(1000 * b);
-        v.extinction[at] =
-            static_cast<float>(thickest * (0.2 + 0.8 * blob(p - Eigen::Vector3d(-0.01, 0.02, 0.01), 0.05)));
-      }
+  each_point(grid, [&](int i, int j, int k, std::size_t at) {
+    const Eigen::Vector3d p = place_of(grid, i, j, k);
+    const double a = blob(p - Eigen::Vector3d(0.03, -0.02, -0.02), 0.03);
+    const double b = blob(p - Eigen::Vector3d(-0.04, 0.03, 0.03), 0.04);
+    v.emission[3 * at] = static_cast<float>(3000 * a);
+    v.emission[3 * at + 1] = static_cast<float>(2000 * a + 500 * b);
+    v.emission[3 * at + 2] = static_cast<float>(1000 * b);
+    v.extinction[at] =
+        static_cast<float>(thickest * (0.2 + 0.8 * blob(p - Eigen::Vector3d(-0.01, 0.02, 0.01), 0.05)));
+  });
   return v;
 }
 

@@ -13,6 +13,7 @@
 #include "recon/hull/hull.h"
 #include "tests/support/lit_scene.h"
 #include "tests/support/small_flame.h"
+#include "tests/support/solves.h"
 
 namespace emberlock::recon {
 namespace {
@@ -44,19 +45,9 @@ Light light_from(Source source, std::array<double, 3> place) {
 /// find_light() on a scene as choose_effects() calls it.
 FoundLight look_for_light(const Scene& scene, const Light& asked) {
   const SolveOptions options = find_on_the_cpu();
-  const auto prepared = PreparedScene::create(scene, {});
-  EXPECT_TRUE(prepared.ok());
-  const SharedMasks masks = prepared->masks(std::nullopt, options.compute);
-  const auto hull = carve(scene, *masks, grid_over(scene.box, kVoxels), options.compute);
-  EXPECT_TRUE(hull.ok());
   Pool pool(0);
-  SolverSetup setup{{}, {}, *hull, {}, options, pool};
-  for (std::size_t v = 0; v < scene.views.size(); ++v) {
-    if (scene.views[v].role != ViewRole::input) continue;
-    setup.views.push_back(&scene.views[v]);
-    setup.boxes.push_back((*masks)[v].box);
-  }
-  return refine_light(setup, find_light(setup, asked));
+  return with_setup(scene, kVoxels, options, pool,
+                    [&](const SolverSetup& setup) { return refine_light(setup, find_light(setup, asked)); });
 }
 
 double degrees_between(const std::array<double, 3>& a, const Eigen::Vector3d& b) {
@@ -101,32 +92,28 @@ TEST(FindNearbyLight, OneNearbyAndWhereItStands) {
 }
 
 double lit_held_out_error(const Scene& scene, const Effects& effects) {
-  const auto done = solve(scene, grid_over(scene.box, kVoxels), effects, find_on_the_cpu());
-  EXPECT_TRUE(done.ok()) << done.error().message();
-  return done.ok() ? all_channels(*done->heldout_rmse) : 0;
+  return all_channels(*solved_on(scene, kVoxels, effects, find_on_the_cpu()).heldout_rmse);
 }
 
 TEST(LitSolveSlow, ShowsWhatItDidNotSeeBetterThanGlowingMediaDo) {
   const test::LitScene smoke = small_smoke(1);
   const Light truth = test::distant_light({1, -0.5, 0.4});
   const Scene scene = film_lit(smoke, lit_truth(smoke, truth));
-  const auto choice = choose_effects(scene, grid_over(scene.box, kVoxels), {}, find_on_the_cpu());
-  ASSERT_TRUE(choice.ok()) << choice.error().message();
-  ASSERT_EQ(choice->reports[1].name, "light");
-  ASSERT_TRUE(choice->reports[1].on) << choice->reports[1].reason;
-  Effects glowing = choice->effects;
+  const auto choice = value_of(choose_effects(scene, grid_over(scene.box, kVoxels), {}, find_on_the_cpu()));
+  ASSERT_EQ(choice.reports[1].name, "light");
+  ASSERT_TRUE(choice.reports[1].on) << choice.reports[1].reason;
+  Effects glowing = choice.effects;
   glowing.light = {};
-  EXPECT_LT(lit_held_out_error(scene, choice->effects), 0.8 * lit_held_out_error(scene, glowing));
+  EXPECT_LT(lit_held_out_error(scene, choice.effects), 0.8 * lit_held_out_error(scene, glowing));
 }
 
 TEST(LightChoiceSlow, FlamesThatGlowAreNotTakenForLit) {
   for (const FlameShape shape : {FlameShape::plume, FlameShape::two_plumes}) {
     const Scene scene = small_flame_scene(PerMeter(32.8), shape);
-    const auto choice = choose_effects(scene, grid_over(scene.box, 32), {}, find_on_the_cpu());
-    ASSERT_TRUE(choice.ok()) << choice.error().message();
-    ASSERT_EQ(choice->reports[1].name, "light");
-    EXPECT_FALSE(choice->reports[1].on) << choice->reports[1].reason;
-    EXPECT_EQ(choice->effects.light.source, Source::none);
+    const auto choice = value_of(choose_effects(scene, grid_over(scene.box, 32), {}, find_on_the_cpu()));
+    ASSERT_EQ(choice.reports[1].name, "light");
+    EXPECT_FALSE(choice.reports[1].on) << choice.reports[1].reason;
+    EXPECT_EQ(choice.effects.light.source, Source::none);
   }
 }
 

@@ -20,8 +20,7 @@ TEST_P(InScatterPicture, PicturesOfAScatteringCloudAgreeWithRandomWalks) {
       recon::look_at({{9, 9}, 20, 20, 4.5, 4.5, {}}, {0.45, 0.1, 0.05}, Eigen::Vector3d::Zero());
   recon::RenderOptions options;
   options.in_scatter.voxels = 16;
-  recon::Effects effects;
-  effects.extinction.model = recon::Extinction::Model::field;
+  recon::Effects effects = scattering_field(Order::none, 0);
   const recon::RadianceImage without = recon::render_view(volume, medium, effects, camera, options);
   for (const double g : {0.0, 0.6}) {
     for (const Order order : {Order::single, Order::multiple}) {
@@ -45,7 +44,7 @@ TEST_P(InScatterPicture, PicturesOfAScatteringCloudAgreeWithRandomWalks) {
 TEST_P(InScatterPicture, PictureOfAFlameOfWhiteSootAgreesWithRandomWalks) {
   const recon::Flame flame;
   const double sigma = flame.options().extinction.value();
-  recon::FlameTruth truth = flame.at(Seconds(0), cube(96));
+  recon::FlameTruth truth = flame.at(Seconds(0), cube_grid(0.2, 96));
   truth.effects.scattering = {Order::multiple, 0.9, 0.5};
   const recon::CameraModel camera =
       recon::look_at({{40, 40}, 40, 40, 20, 20, {}}, {0.3, 0, 0.03}, Eigen::Vector3d::Zero());

@@ -8,6 +8,7 @@
 #include "recon/hull/hull.h"
 #include "recon/render/in_scatter.h"
 #include "tests/support/devices.h"
+#include "tests/support/key_points.h"
 #include "tests/support/random_walks.h"
 
 namespace emberlock {
@@ -82,8 +83,8 @@ SlabResult wide_box(int cells, int width, double cell, double albedo, double asy
   options.voxels = width;
   options.octant_levels = 3;
   recon::Pool pool(0, device_here());
-  const recon::ScatterField field = recon::find_in_scatter(
-      volume, whole_grid(grid), scattering(sigma, Order::multiple, albedo, asymmetry), options, pool);
+  const recon::ScatterField field =
+      scatter_field(volume, scattering(sigma, Order::multiple, albedo, asymmetry), pool, options);
   const std::vector<recon::Rgba> g = recon::in_scattered(field, {0.3, 0.2, 5}, pool);
   return {green(g, grid.index(width / 2, width / 2, 0)),
           green(g, grid.index(width / 2, width / 2, cells / 2))};
@@ -140,26 +141,18 @@ double leaving(const recon::ScatterField& field, const std::vector<recon::Rgba>&
 
 TEST_P(InScatterSlab, WhatABoxOfAlmostWhiteMediumEmitsLeavesIt) {
   const recon::Volume volume = cloud(12, 30);
-  recon::Effects effects;
-  effects.extinction.model = recon::Extinction::Model::field;
-  effects.scattering = {Order::multiple, 0.999, 0};
   recon::Pool pool(0, device_here());
-  const recon::ScatterField field =
-      recon::find_in_scatter(volume, whole_grid(volume.grid), effects, {}, pool);
+  const recon::ScatterField field = scatter_field(volume, scattering_field(Order::multiple, 0.999), pool);
   const std::vector<recon::Rgba> g = recon::in_scattered(field, {1, 0, 0}, pool);
   const int n = field.medium.grid.nx - 1;
   double emitted = 0;
   double absorbed = 0;
-  for (int k = 0; k <= n; ++k)
-    for (int j = 0; j <= n; ++j)
-      for (int i = 0; i <= n; ++i) {
-        const auto half = [&](int x) { return x == 0 || x == n ? 0.5 : 1.0; };
-        const double share = 4 * std::numbers::pi * half(i) * half(j) * half(k);
-        const std::size_t at = field.medium.grid.index(i, j, k);
-        emitted += share * static_cast<double>(field.medium.shine[at].c[1]);
-        absorbed +=
-            share * (1 - field.albedo) * static_cast<double>(field.medium.shine[at].c[3]) * green(g, at);
-      }
+  each_point(field.medium.grid, [&](int i, int j, int k, std::size_t at) {
+    const auto half = [&](int x) { return x == 0 || x == n ? 0.5 : 1.0; };
+    const double share = 4 * std::numbers::pi * half(i) * half(j) * half(k);
+    emitted += share * static_cast<double>(field.medium.shine[at].c[1]);
+    absorbed += share * (1 - field.albedo) * static_cast<double>(field.medium.shine[at].c[3]) * green(g, at);
+  });
   double left = 0;
   for (int axis = 0; axis < 3; ++axis)
     for (const int side : {0, n})
@@ -181,21 +174,17 @@ TEST_P(InScatterSlab, WhatABoxOfAlmostWhiteMediumEmitsLeavesIt) {
 
 TEST_P(InScatterSlab, CoarseningKeepsTheEmissionAndTheOpticalMass) {
   const recon::Volume volume = cloud(23, 30);
-  recon::Effects effects;
-  effects.extinction.model = recon::Extinction::Model::field;
-  effects.scattering = {Order::single, 0.5, 0};
   recon::InScatterOptions options;
   options.voxels = 7;
   recon::Pool pool(0, device_here());
   const recon::ScatterField field =
-      recon::find_in_scatter(volume, whole_grid(volume.grid), effects, options, pool);
+      scatter_field(volume, scattering_field(Order::single, 0.5), pool, options);
   const auto total = [](const recon::Grid& g, const auto& value) {
     double sum = 0;
-    for (int k = 0; k < g.nz; ++k)
-      for (int j = 0; j < g.ny; ++j)
-        for (int i = 0; i < g.nx; ++i)
-          sum += value(g.index(i, j, k)) * (i == 0 || i == g.nx - 1 ? 0.5 : 1) *
-                 (j == 0 || j == g.ny - 1 ? 0.5 : 1) * (k == 0 || k == g.nz - 1 ? 0.5 : 1);
+    each_point(g, [&](int i, int j, int k, std::size_t p) {
+      sum += value(p) * (i == 0 || i == g.nx - 1 ? 0.5 : 1) * (j == 0 || j == g.ny - 1 ? 0.5 : 1) *
+             (k == 0 || k == g.nz - 1 ? 0.5 : 1);
+    });
     return sum * std::pow(static_cast<double>(g.edge), 3);
   };
   const double edge = static_cast<double>(field.medium.grid.edge);

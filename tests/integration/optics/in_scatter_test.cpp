@@ -21,7 +21,6 @@ TEST_P(InScatter, AgreesWithRandomWalksThroughACloud) {
   constexpr double kThickest = 30;
   constexpr int kWalks = 15000;
   const recon::Volume volume = cloud(24, kThickest);
-  const recon::Hull medium = recon::whole_grid(volume.grid);
   const Eigen::Vector3d camera(0.28, 0.1, 0.05);
   recon::InScatterOptions options;
   options.voxels = 12;
@@ -30,14 +29,12 @@ TEST_P(InScatter, AgreesWithRandomWalksThroughACloud) {
                                      {Order::single, 0.9, 0.6},    {Order::multiple, 0.9, 0.6},
                                      {Order::multiple, 0.9, -0.4}, {Order::multiple, 0.9, 0.9}};
   for (const recon::Scattering& s : cases) {
-    recon::Effects effects;
-    effects.extinction.model = recon::Extinction::Model::field;
-    effects.scattering = s;
-    const recon::ScatterField field = recon::find_in_scatter(volume, medium, effects, options, pool);
+    const recon::ScatterField field =
+        scatter_field(volume, scattering_field(s.order, s.albedo, s.asymmetry), pool, options);
     const std::vector<recon::Rgba> found = recon::in_scattered(field, camera, pool);
     for (const auto& [i, j, k] :
          {std::array{6, 6, 6}, std::array{3, 7, 8}, std::array{9, 4, 4}, std::array{0, 6, 6}}) {
-      const Eigen::Vector3d p = place(field.medium.grid, i, j, k);
+      const Eigen::Vector3d p = place_of(field.medium.grid, i, j, k);
       const Estimate truth =
           RandomWalks{volume, kThickest, s}.in_scatter(p, (camera - p).normalized(), kWalks);
       EXPECT_NEAR(green(found, field.medium.grid.index(i, j, k)), truth.mean,
@@ -49,9 +46,7 @@ TEST_P(InScatter, AgreesWithRandomWalksThroughACloud) {
 
 TEST_P(InScatter, FinerGridsComeCloserToRandomWalks) {
   const recon::Volume volume = cloud(24, 30);
-  recon::Effects effects;
-  effects.extinction.model = recon::Extinction::Model::field;
-  effects.scattering = {Order::single, 0.9, 0};
+  const recon::Effects effects = scattering_field(Order::single, 0.9);
   const Eigen::Vector3d at(0.05, -0.0333333333333333333,
                            -0.0333333333333333333);  // key point (9, 4, 4) of 12
   const Estimate truth =
@@ -61,8 +56,7 @@ TEST_P(InScatter, FinerGridsComeCloserToRandomWalks) {
   for (const int voxels : {12, 24}) {
     recon::InScatterOptions options;
     options.voxels = voxels;
-    const recon::ScatterField field =
-        recon::find_in_scatter(volume, recon::whole_grid(volume.grid), effects, options, pool);
+    const recon::ScatterField field = scatter_field(volume, effects, pool, options);
     const int scale = voxels / 12;
     error[scale - 1] = green(recon::in_scattered(field, {1, 0, 0}, pool),
                              field.medium.grid.index(9 * scale, 4 * scale, 4 * scale)) -
@@ -75,19 +69,19 @@ TEST_P(InScatter, FinerGridsComeCloserToRandomWalks) {
 // ---- What is left out, limits, hard cases
 
 TEST_P(InScatter, NothingRunsWhereNothingScatters) {
-  const recon::Grid grid = cube(4);
+  const recon::Grid grid = cube_grid(0.2, 4);
   const recon::Volume volume = uniform_volume(grid, 100);
   recon::Hull nothing = recon::whole_grid(grid);
   nothing.inside.assign(nothing.inside.size(), 0);
   nothing.count = 0;
   recon::Pool pool(0, device_here());
   const recon::Effects on = scattering(PerMeter(30), Order::multiple, 0.5);
-  EXPECT_FALSE(recon::find_in_scatter(volume, recon::whole_grid(grid), on, {}, pool).empty());
+  EXPECT_FALSE(scatter_field(volume, on, pool).empty());
   EXPECT_TRUE(recon::find_in_scatter(volume, nothing, on, {}, pool).empty());
   for (const recon::Effects& off :
        {scattering(PerMeter(30), Order::none, 0.5), scattering(PerMeter(30), Order::multiple, 0),
         scattering(PerMeter(0), Order::multiple, 0.5)}) {
-    const recon::ScatterField field = recon::find_in_scatter(volume, recon::whole_grid(grid), off, {}, pool);
+    const recon::ScatterField field = scatter_field(volume, off, pool);
     EXPECT_TRUE(field.empty());
     EXPECT_TRUE(field.ordinates.empty() && field.medium.shine.empty());
     EXPECT_EQ(greatest(recon::in_scattered(field, {1, 0, 0}, pool)), 0);
@@ -96,14 +90,11 @@ TEST_P(InScatter, NothingRunsWhereNothingScatters) {
 
 TEST_P(InScatter, MultipleScatteringTendsToSingleAsTheAlbedoVanishes) {
   const recon::Volume volume = cloud(8, 30);
-  recon::Effects effects;
-  effects.extinction.model = recon::Extinction::Model::field;
   recon::Pool pool(0, device_here());
   for (const double g : {0.0, 0.5}) {
     const auto found = [&](Order order, double albedo) {
-      effects.scattering = {order, albedo, g};
-      return recon::in_scattered(
-          recon::find_in_scatter(volume, recon::whole_grid(volume.grid), effects, {}, pool), {1, 0, 0}, pool);
+      return recon::in_scattered(scatter_field(volume, scattering_field(order, albedo, g), pool), {1, 0, 0},
+                                 pool);
     };
     const std::vector<recon::Rgba> single = found(Order::single, 1e-6);
     const std::vector<recon::Rgba> multiple = found(Order::multiple, 1e-6);
@@ -116,19 +107,15 @@ TEST_P(InScatter, MultipleScatteringTendsToSingleAsTheAlbedoVanishes) {
 
 TEST_P(InScatter, ErrorBoundHoldsAndAlmostWhiteThickMediaConverge) {
   const recon::Volume volume = cloud(10, 60);
-  recon::Effects effects;
-  effects.extinction.model = recon::Extinction::Model::field;
   recon::Pool pool(0, device_here());
   for (const double asymmetry : {0.0, 0.8, -0.8}) {
-    effects.scattering = {Order::multiple, 0.999, asymmetry};
+    const recon::Effects effects = scattering_field(Order::multiple, 0.999, asymmetry);
     recon::InScatterOptions options;
     options.octant_levels = 2;
     options.tolerance = 0.03;
-    const recon::ScatterField rough =
-        recon::find_in_scatter(volume, recon::whole_grid(volume.grid), effects, options, pool);
+    const recon::ScatterField rough = scatter_field(volume, effects, pool, options);
     options.tolerance = 1e-4;
-    const recon::ScatterField exact =
-        recon::find_in_scatter(volume, recon::whole_grid(volume.grid), effects, options, pool);
+    const recon::ScatterField exact = scatter_field(volume, effects, pool, options);
     EXPECT_LE(rough.error_bound, 0.03);
     EXPECT_LE(exact.error_bound, 2e-4);  // rounding adds to what the recurrence says
     EXPECT_LT(exact.iterations, 60) << asymmetry;
@@ -143,7 +130,7 @@ TEST_P(InScatter, ErrorBoundHoldsAndAlmostWhiteThickMediaConverge) {
 TEST_P(InScatter, HardCasesStayFiniteAndNonNegative) {
   recon::Pool pool(0, device_here());
   const recon::Box needle{Eigen::Vector3d::Zero(), {0.02, 0.2, 0.02}};
-  for (const recon::Grid& grid : {cube(1), cube(6), recon::grid_over(needle, 10)}) {
+  for (const recon::Grid& grid : {cube_grid(0.2, 1), cube_grid(0.2, 6), recon::grid_over(needle, 10)}) {
     const recon::Volume volume = uniform_volume(grid, 1000);
     recon::Hull checked = recon::whole_grid(grid);
     checked.count = 0;
@@ -159,7 +146,7 @@ TEST_P(InScatter, HardCasesStayFiniteAndNonNegative) {
               volume, checked, scattering(PerMeter(sigma), Order::multiple, albedo, g), options, pool);
           ASSERT_TRUE(std::isfinite(field.error_bound));
           for (const Eigen::Vector3d& camera :
-               {Eigen::Vector3d(0.3, 0, 0), place(field.medium.grid, 0, 0, 0)})
+               {Eigen::Vector3d(0.3, 0, 0), place_of(field.medium.grid, 0, 0, 0)})
             for (const recon::Rgba& v : recon::in_scattered(field, camera, pool))
               for (int c = 0; c < 4; ++c)
                 ASSERT_TRUE(v.c[c] >= 0 && std::isfinite(v.c[c])) << sigma << ' ' << g << ' ' << albedo;
@@ -169,16 +156,13 @@ TEST_P(InScatter, HardCasesStayFiniteAndNonNegative) {
 
 TEST_P(InScatter, SameBitsForAnyNumberOfThreads) {
   const recon::Volume volume = cloud(7, 30);
-  recon::Effects effects;
-  effects.extinction.model = recon::Extinction::Model::field;
   for (const double g : {0.0, 0.9}) {
-    effects.scattering = {Order::multiple, 0.9, g};
+    const recon::Effects effects = scattering_field(Order::multiple, 0.9, g);
     std::vector<recon::Rgba> first;
     for (const int threads : {1, 2, 16}) {
       recon::Pool pool(threads, device_here());
-      const std::vector<recon::Rgba> found = recon::in_scattered(
-          recon::find_in_scatter(volume, recon::whole_grid(volume.grid), effects, {}, pool), {0.3, 0.1, 0},
-          pool);
+      const std::vector<recon::Rgba> found =
+          recon::in_scattered(scatter_field(volume, effects, pool), {0.3, 0.1, 0}, pool);
       if (first.empty()) first = found;
       for (std::size_t i = 0; i < found.size(); ++i)
         for (std::size_t c = 0; c < 4; ++c) ASSERT_EQ(found[i].c[c], first[i].c[c]) << threads;

@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "recon/calibrate/calibrate_rig.h"
 
-#include <algorithm>
 #include <cmath>
 
 #include <gmock/gmock.h>
 
 #include "recon/calibrate/next_pictures.h"
 #include "tests/support/pose_errors.h"
+#include "tests/support/results.h"
 
 namespace emberlock::recon {
 namespace {
@@ -28,24 +28,23 @@ void keep(BoardSightings& sightings, auto wanted) {
 TEST(CalibrateRigSlow, ARingWithWrongCornersIsFoundAndItsUncertaintiesAreRight) {
   test::BoardRigOptions options = small_rig(6, 26);
   const test::BoardRig rig = test::board_rig(options);
-  const auto found = calibrate_rig(rig.sightings, {.world = "0"});
-  ASSERT_TRUE(found.ok()) << found.error().message();
-  ASSERT_TRUE(found->whole());
-  const test::PoseErrors among = test::errors_among_cameras(*found, rig.cameras);
+  const auto found = value_of(calibrate_rig(rig.sightings, {.world = "0"}));
+  ASSERT_TRUE(found.whole());
+  const test::PoseErrors among = test::errors_among_cameras(found, rig.cameras);
   EXPECT_LT(among.place, 1.5e-3);
   EXPECT_LT(among.rays, 0.15 * M_PI / 180);
-  const test::PoseErrors world = test::errors_in_world(*found, rig.cameras);
+  const test::PoseErrors world = test::errors_in_world(found, rig.cameras);
   // 99.98 % of chi-square with 36 degrees of freedom.
   EXPECT_GT(world.chi2, 12.0);
   EXPECT_LT(world.chi2, 74.0);
-  for (const CalibratedCamera& camera : found->cameras) {
+  for (const CalibratedCamera& camera : found.cameras) {
     EXPECT_NEAR(camera.fit.noise, 0.2, 0.02);
     const auto outliers = static_cast<double>(camera.corners - camera.corners_used);
     EXPECT_NEAR(outliers / static_cast<double>(camera.corners), 0.05, 0.025)
         << "the wrong ones, and they alone";
   }
-  ASSERT_TRUE(found->box) << "all look at one place";
-  EXPECT_GT(found->box->size.x(), 0.03);
+  ASSERT_TRUE(found.box) << "all look at one place";
+  EXPECT_GT(found.box->size.x(), 0.03);
 }
 
 TEST(CalibrateRig, ExactCornersGiveTheExactRig) {
@@ -53,9 +52,8 @@ TEST(CalibrateRig, ExactCornersGiveTheExactRig) {
   options.noise = 0;
   options.wrong = 0;
   const test::BoardRig rig = test::board_rig(options);
-  const auto found = calibrate_rig(rig.sightings, {.world = "0"});
-  ASSERT_TRUE(found.ok()) << found.error().message();
-  const test::PoseErrors world = test::errors_in_world(*found, rig.cameras);
+  const auto found = value_of(calibrate_rig(rig.sightings, {.world = "0"}));
+  const test::PoseErrors world = test::errors_in_world(found, rig.cameras);
   EXPECT_LT(world.place, 2e-6);
   EXPECT_LT(world.turn, 2e-5);
 }
@@ -65,11 +63,10 @@ TEST(CalibrateRig, ViewsThatDontFitAreNamed) {
   auto& bad = rig.sightings.sightings[4];
   for (BoardCorner& corner : bad.corners)
     corner.pixel += Eigen::Vector2d(5.0 * (corner.id % 2), 3.0 * (corner.id % 3));
-  const auto found = calibrate_rig(rig.sightings);
-  ASSERT_TRUE(found.ok()) << found.error().message();
-  ASSERT_EQ(found->rejected.size(), 1U);
-  EXPECT_EQ(found->rejected[0].sighting, 4U);
-  EXPECT_FALSE(found->rejected[0].why.empty());
+  const auto found = value_of(calibrate_rig(rig.sightings));
+  ASSERT_EQ(found.rejected.size(), 1U);
+  EXPECT_EQ(found.rejected[0].sighting, 4U);
+  EXPECT_FALSE(found.rejected[0].why.empty());
 }
 
 TEST(CalibrateRig, ACameraThatSharesNoInstantHasALensAndIsNamed) {
@@ -80,15 +77,14 @@ TEST(CalibrateRig, ACameraThatSharesNoInstantHasALensAndIsNamed) {
     sighting.instant = rig.sightings.instants.size();
     rig.sightings.instants.push_back("alone " + std::to_string(sighting.instant));
   }
-  const auto found = calibrate_rig(rig.sightings);
-  ASSERT_TRUE(found.ok()) << found.error().message();
-  EXPECT_FALSE(found->whole());
-  EXPECT_TRUE(found->cameras[0].placed);
-  EXPECT_TRUE(found->cameras[2].calibrated);
-  EXPECT_FALSE(found->cameras[2].placed);
-  EXPECT_THAT(found->cameras[2].why, HasSubstr("shares no usable instant"));
-  EXPECT_THAT(next_pictures(*found), testing::Contains(HasSubstr("cam02: shares no usable instant")));
-  const v1::Rig written = rig_of(*found, "");
+  const auto found = value_of(calibrate_rig(rig.sightings));
+  EXPECT_FALSE(found.whole());
+  EXPECT_TRUE(found.cameras[0].placed);
+  EXPECT_TRUE(found.cameras[2].calibrated);
+  EXPECT_FALSE(found.cameras[2].placed);
+  EXPECT_THAT(found.cameras[2].why, HasSubstr("shares no usable instant"));
+  EXPECT_THAT(next_pictures(found), testing::Contains(HasSubstr("cam02: shares no usable instant")));
+  const v1::Rig written = rig_of(found, "");
   EXPECT_EQ(written.cameras(2).calibration().camera_from_world_size(), 0);
   EXPECT_EQ(written.cameras(0).calibration().sigma_size(), 15 + 21);
 }
@@ -96,15 +92,11 @@ TEST(CalibrateRig, ACameraThatSharesNoInstantHasALensAndIsNamed) {
 TEST(CalibrateRig, TooFewViewsSayHowManyAndWhatToDo) {
   test::BoardRig rig = test::board_rig(small_rig(2, 4));
   rig.sightings.sightings.clear();
-  const auto none = calibrate_rig(rig.sightings);
-  ASSERT_FALSE(none.ok());
-  EXPECT_THAT(none.error().message(), HasSubstr("found in no picture"));
+  EXPECT_THAT(calibrate_rig(rig.sightings), FailsWith("found in no picture"));
   test::BoardRigOptions two = small_rig(2, 12);
   BoardSightings few = test::board_rig(two).sightings;
   keep(few, [](const auto& s) { return s.instant < 2; });
-  const auto found = calibrate_rig(few);
-  ASSERT_FALSE(found.ok());
-  EXPECT_THAT(found.error().message(), HasSubstr("at least 3"));
+  EXPECT_THAT(calibrate_rig(few), FailsWith("at least 3"));
 }
 
 TEST(CalibrateRig, ParallelBoardsAreRefused) {
@@ -127,22 +119,18 @@ TEST(CalibrateRig, ParallelBoardsAreRefused) {
   }
   const auto found = calibrate_rig(sightings);
   ASSERT_FALSE(found.ok()) << "focal length " << found->cameras[0].fit.model.intrinsics.fx;
-  EXPECT_THAT(found.error().message(), HasSubstr("tilted"));
+  EXPECT_THAT(found, FailsWith("tilted"));
 }
 
 TEST(CalibrateRig, TheWorldMustBeAnInstantThatWasUsed) {
   const test::BoardRig rig = test::board_rig(small_rig(2, 8));
-  const auto found = calibrate_rig(rig.sightings, {.world = "nowhere"});
-  ASSERT_FALSE(found.ok());
-  EXPECT_THAT(found.error().message(), HasSubstr("--world nowhere"));
+  EXPECT_THAT(calibrate_rig(rig.sightings, {.world = "nowhere"}), FailsWith("--world nowhere"));
 }
 
 TEST(CalibrateRig, ABoardThatLooksTheSameUpsideDownIsRefusedForSeveralCameras) {
   BoardSightings sightings = test::board_rig(small_rig(2, 4)).sightings;
   sightings.board.columns = 10;
-  const auto found = calibrate_rig(sightings);
-  ASSERT_FALSE(found.ok());
-  EXPECT_THAT(found.error().message(), HasSubstr("upside down"));
+  EXPECT_THAT(calibrate_rig(sightings), FailsWith("upside down"));
 }
 
 TEST(CalibrateRig, TheSquareRootLaw) {

@@ -13,6 +13,7 @@
 #include "recon/pipeline/scene.h"
 #include "recon/preprocess/colour.h"
 #include "tests/support/recording.h"
+#include "tests/support/results.h"
 
 namespace emberlock::recon {
 namespace {
@@ -44,12 +45,11 @@ class CameraResponseFile : public testing::Test {
 TEST_F(CameraResponseFile, ATransformsNamesItBesideItself) {
   ASSERT_TRUE(write_file_atomically(folder_.path() / "response.json", to_json(small_response())).ok());
   const fs::path file = write("response.json");
-  const auto scene = load_scene(file);
-  ASSERT_TRUE(scene.ok()) << scene.error().message();
-  ASSERT_NE(scene->response, nullptr);
-  EXPECT_EQ(*scene->response, small_response());
+  const auto scene = value_of(load_scene(file));
+  ASSERT_NE(scene.response, nullptr);
+  EXPECT_EQ(*scene.response, small_response());
   EXPECT_THAT(files_of(file), testing::Contains(folder_.path() / "response.json"));
-  EXPECT_EQ(with_views(*scene, 1).response, scene->response);
+  EXPECT_EQ(with_views(scene, 1).response, scene.response);
 }
 
 TEST_F(CameraResponseFile, WhatCantBeReadNamesFileAndField) {
@@ -59,27 +59,29 @@ TEST_F(CameraResponseFile, WhatCantBeReadNamesFileAndField) {
     ASSERT_FALSE(scene.ok()) << value.dump();
     EXPECT_THAT(scene.error().where, HasSubstr("transforms.json: camera_response"));
   }
-  const auto absent = load_scene(write("nowhere.json"));
-  ASSERT_FALSE(absent.ok());
-  EXPECT_THAT(absent.error().message(), HasSubstr("transforms.json: camera_response"));
-  EXPECT_THAT(absent.error().message(), HasSubstr("nowhere.json"));
+  EXPECT_THAT(load_scene(write("nowhere.json")),
+              FailsWith("transforms.json: camera_response", "nowhere.json"));
   ASSERT_TRUE(write_file_atomically(folder_.path() / "bad.json", R"({"unit": "relative"})").ok());
-  const auto bad = load_scene(write("bad.json"));
-  ASSERT_FALSE(bad.ok());
-  EXPECT_THAT(bad.error().message(), testing::AllOf(HasSubstr("bad.json"), HasSubstr("wavelength_nm")));
+  EXPECT_THAT(load_scene(write("bad.json")), FailsWith("bad.json", "wavelength_nm"));
 }
 
 TEST_F(CameraResponseFile, ARigKeepsItWhenItIsConverted) {
   ASSERT_TRUE(write_file_atomically(folder_.path() / "response.json", to_json(small_response())).ok());
-  const auto rig = import_rig(write("response.json"));
-  ASSERT_TRUE(rig.ok()) << rig.error().message();
-  EXPECT_EQ(**common_response(*rig, "rig"), small_response());
+  const auto rig = value_of(import_rig(write("response.json")));
+  EXPECT_EQ(**common_response(rig, "rig"), small_response());
   const fs::path out = folder_.path() / "out";
-  ASSERT_TRUE(export_rig(*rig, out).ok());
-  const auto again = read_transforms(out / "transforms.json");
-  ASSERT_TRUE(again.ok());
-  EXPECT_EQ(**response_of(*again), small_response());
+  ASSERT_TRUE(export_rig(rig, out).ok());
+  const auto again = value_of(read_transforms(out / "transforms.json"));
+  EXPECT_EQ(**response_of(again), small_response());
   EXPECT_EQ(**common_response(*session::read_rig(out / "rig.json"), "rig"), small_response());
+}
+
+template <class Camera>
+Camera& camera_a(Camera& camera) {
+  camera.set_camera_id("a");
+  camera.set_width(640);
+  camera.set_height(480);
+  return camera;
 }
 
 TEST(SpectralColour, AResponseIsReadBackAsItWas) {
@@ -88,64 +90,48 @@ TEST(SpectralColour, AResponseIsReadBackAsItWas) {
   colour.exposure = Seconds(1.0 / 240);
   colour.gain = {1.5, 1, 0.75};
   v1::Rig rig = empty_rig();
-  v1::RigCamera& camera = *rig.add_cameras();
-  camera.set_camera_id("a");
-  camera.set_width(640);
-  camera.set_height(480);
-  *camera.mutable_colour() = to_message(colour);
-  const auto parsed = session::parse_rig(*session::rig_json(rig), "rig.json");
-  ASSERT_TRUE(parsed.ok()) << parsed.error().message();
-  const auto back = read_colour(parsed->cameras(0).colour(), {640, 480}, "a");
-  ASSERT_TRUE(back.ok()) << back.error().message();
-  EXPECT_EQ(*back->spectral, small_response());
-  EXPECT_EQ(back->exposure, colour.exposure);
-  EXPECT_EQ(back->gain, colour.gain);
-  EXPECT_FALSE(changes_nothing(*back));
+  *camera_a(*rig.add_cameras()).mutable_colour() = to_message(colour);
+  const auto parsed = value_of(session::parse_rig(*session::rig_json(rig), "rig.json"));
+  const auto back = value_of(read_colour(parsed.cameras(0).colour(), {640, 480}, "a"));
+  EXPECT_EQ(*back.spectral, small_response());
+  EXPECT_EQ(back.exposure, colour.exposure);
+  EXPECT_EQ(back.gain, colour.gain);
+  EXPECT_FALSE(changes_nothing(back));
   colour.gain = {1, 1, 1};
   EXPECT_TRUE(changes_nothing(colour));
 
   v1::Manifest manifest;
-  v1::CameraStream& stream = *manifest.add_cameras();
-  stream.set_camera_id("a");
-  stream.set_width(640);
-  stream.set_height(480);
-  ASSERT_TRUE(apply_rig(manifest, *parsed, "rig.json").ok());
+  camera_a(*manifest.add_cameras());
+  ASSERT_TRUE(apply_rig(manifest, parsed, "rig.json").ok());
   EXPECT_EQ(**common_response(manifest, "manifest.json"), small_response());
   EXPECT_EQ(manifest.cameras(0).colour().exposure_s(), 1.0 / 240);
 }
 
 TEST(SpectralColour, OldFilesHaveNone) {
-  const auto rig = session::parse_rig(
+  const auto rig = value_of(session::parse_rig(
       R"({"format_version": 1, "cameras": [{"camera_id": "a", "width": 4, "height": 4, "colour": {"gain": [1, 2, 1]}}]})",
-      "rig.json");
-  ASSERT_TRUE(rig.ok()) << rig.error().message();
-  const auto colour = read_colour(rig->cameras(0).colour(), {4, 4}, "a");
-  ASSERT_TRUE(colour.ok());
-  EXPECT_EQ(colour->spectral, nullptr);
-  EXPECT_EQ(colour->exposure, Seconds(0));
-  EXPECT_EQ(*common_response(*rig, "rig.json"), nullptr);
-  EXPECT_FALSE(to_message(*colour).has_spectral());
+      "rig.json"));
+  const auto colour = value_of(read_colour(rig.cameras(0).colour(), {4, 4}, "a"));
+  EXPECT_EQ(colour.spectral, nullptr);
+  EXPECT_EQ(colour.exposure, Seconds(0));
+  EXPECT_EQ(*common_response(rig, "rig.json"), nullptr);
+  EXPECT_FALSE(to_message(colour).has_spectral());
 }
 
 TEST(SpectralColour, WhatIsntValidNamesTheField) {
   v1::Colour colour;
   *colour.mutable_spectral() = message_of(small_response());
   colour.mutable_spectral()->add_g(3);
-  EXPECT_THAT(read_colour(colour, {4, 4}, "camera a").error().message(),
-              testing::AllOf(HasSubstr("camera a.colour.spectral"), HasSubstr("g")));
+  EXPECT_THAT(read_colour(colour, {4, 4}, "camera a"), FailsWith("camera a.colour.spectral", "g"));
   colour.mutable_spectral()->Clear();
-  EXPECT_THAT(read_colour(colour, {4, 4}, "a").error().message(), HasSubstr("zero width"));
+  EXPECT_THAT(read_colour(colour, {4, 4}, "a"), FailsWith("zero width"));
   for (const double seconds : {-1.0, 4000.0, std::numeric_limits<double>::quiet_NaN()}) {
     v1::Colour timed;
     timed.set_exposure_s(seconds);
-    EXPECT_THAT(read_colour(timed, {4, 4}, "a").error().message(), HasSubstr("exposure_s"));
+    EXPECT_THAT(read_colour(timed, {4, 4}, "a"), FailsWith("exposure_s"));
   }
   v1::Rig rig = empty_rig();
-  v1::RigCamera& camera = *rig.add_cameras();
-  camera.set_camera_id("a");
-  camera.set_width(4);
-  camera.set_height(4);
-  camera.mutable_colour()->mutable_spectral()->add_r(std::numeric_limits<double>::infinity());
+  camera_a(*rig.add_cameras()).mutable_colour()->mutable_spectral()->add_r(INFINITY);
   EXPECT_FALSE(session::check_rig(rig, "rig.json").ok());
 }
 
@@ -161,9 +147,7 @@ TEST(SpectralColour, CamerasWithDifferentResponsesAreRefused) {
   EXPECT_TRUE(common_response(manifest, "m").ok());
   set(2, 2);
   const auto differ = common_response(manifest, "manifest.json");
-  ASSERT_FALSE(differ.ok());
-  EXPECT_THAT(differ.error().message(),
-              testing::AllOf(HasSubstr("manifest.json: camera c"), HasSubstr("camera b's")));
+  ASSERT_THAT(differ, FailsWith("manifest.json: camera c", "camera b's"));
   EXPECT_THAT(differ.error().remedy, HasSubstr("equalised to one radiance"));
 }
 

@@ -15,6 +15,7 @@
 #include "recon/export/volume_file.h"
 #include "recon/pipeline/certify.h"
 #include "tests/support/recording.h"
+#include "tests/support/results.h"
 #include "tests/support/signing_key.h"
 
 namespace emberlock::recon {
@@ -125,8 +126,8 @@ TEST_F(VolumeCertificateTest, AForgerySealedWithAnotherKeyIsFoundByTheTrustedOne
   reseal(path, forged, key(2).get());
   const auto found = check_volume(path);
   ASSERT_TRUE(found.ok() && *found) << "the forger's own key does hold";
-  EXPECT_THAT(session::check_signer((*found)->seal, key(1)->public_key(), "a.vdb").error().message(),
-              HasSubstr("is signed by another key"));
+  EXPECT_THAT(session::check_signer((*found)->seal, key(1)->public_key(), "a.vdb"),
+              FailsWith("is signed by another key"));
   reseal(path, forged, nullptr);
   EXPECT_THAT(session::check_signer(check_volume(path).value()->seal, key(1)->public_key(), "").error().what,
               HasSubstr("isn't signed"));
@@ -166,14 +167,12 @@ TEST_F(VolumeCertificateTest, AVolumeWithoutOneIsReadAsBefore) {
   bytes.replace(bytes.find(kCertificateKey), 20, "emberlock_something_");  // as if no certificate were there
   put_bytes(path, bytes);
   EXPECT_EQ(checked(path), "none");
-  const auto volume = read_volume(path);
-  ASSERT_TRUE(volume.ok()) << volume.error().message();
-  EXPECT_EQ(volume->emission, a_flame().emission);
+  const auto volume = value_of(read_volume(path));
+  EXPECT_EQ(volume.emission, a_flame().emission);
   EXPECT_TRUE(read_shared_volume(path).ok());
   EXPECT_TRUE(read_lighting(path).ok());
-  const auto exported = origin_of_export(path);
-  ASSERT_TRUE(exported.ok());
-  EXPECT_FALSE(exported->has_exported());
+  const auto exported = value_of(origin_of_export(path));
+  EXPECT_FALSE(exported.has_exported());
 }
 
 TEST_F(VolumeCertificateTest, AnExportTellsOfTheVolumeThatItIsOf) {

@@ -15,7 +15,9 @@
 #include "session/files.h"
 #include "session/shutter_times.h"
 #include "tests/support/recording.h"
+#include "tests/support/results.h"
 #include "tests/support/scene_files.h"
+#include "tests/support/small_flame.h"
 
 namespace emberlock::recon {
 namespace {
@@ -42,13 +44,12 @@ class CertifySessionTest : public testing::Test {
     }
     session::WriterOptions options = test::small_disk_options();
     options.frames_per_segment = 2;
-    auto writer = session::SessionWriter::create(session_, manifest, options);
-    ASSERT_TRUE(writer.ok());
-    for (const v1::Event& event : events) ASSERT_TRUE(writer->append(event).ok());
+    auto writer = value_of(session::SessionWriter::create(session_, manifest, options));
+    for (const v1::Event& event : events) ASSERT_TRUE(writer.append(event).ok());
     for (std::size_t camera = 0; camera < 3; ++camera)
       for (std::uint64_t f = 0; f < 6; ++f)
-        ASSERT_TRUE(writer->write(camera, test::noise_frame(layout, f, camera)).ok());
-    ASSERT_TRUE(writer->finish().ok());
+        ASSERT_TRUE(writer.write(camera, test::noise_frame(layout, f, camera)).ok());
+    ASSERT_TRUE(writer.finish().ok());
   }
   void tell_times() const {
     v1::ShutterTimes times;
@@ -63,9 +64,7 @@ class CertifySessionTest : public testing::Test {
   [[nodiscard]] v1::VolumeCertificate told(FileHashes* hashes, std::size_t frame = 4) const {
     SceneOptions options;
     options.frame = frame;
-    const auto origin = origin_of(session_, options, {}, hashes);
-    EXPECT_TRUE(origin.ok()) << origin.error().message();
-    return origin.ok() ? *origin : v1::VolumeCertificate();
+    return value_of(origin_of(session_, options, {}, hashes));
   }
 
   test::TempFolder folder_;
@@ -142,10 +141,9 @@ TEST_F(CertifySessionTest, TellsHowWellTheCamerasWereInSyncByTheLastDecisionOfAn
 
 TEST_F(CertifySessionTest, TellsTheInstantsOfStaggeredCamerasByTheManifest) {
   record();
-  auto manifest = session::read_manifest(session_);
-  ASSERT_TRUE(manifest.ok());
-  for (int i = 0; i < 3; ++i) manifest->mutable_cameras(i)->set_late_s(1e-3 * i);
-  ASSERT_TRUE(session::write_manifest(session_, *manifest).ok());
+  auto manifest = value_of(session::read_manifest(session_));
+  for (int i = 0; i < 3; ++i) manifest.mutable_cameras(i)->set_late_s(1e-3 * i);
+  ASSERT_TRUE(session::write_manifest(session_, manifest).ok());
   const v1::SyncEvidence sync = told(&hashes_).session().sync();
   EXPECT_EQ(sync.source(), "manifest.json");
   ASSERT_EQ(sync.cameras_size(), 3);
@@ -155,26 +153,22 @@ TEST_F(CertifySessionTest, TellsTheInstantsOfStaggeredCamerasByTheManifest) {
 
 TEST_F(CertifySessionTest, EndsAsItIsAsked) {
   record();
-  const auto ended = origin_of(session_, {}, {}, &hashes_, [](double, std::string_view) { return false; });
-  ASSERT_FALSE(ended.ok());
-  EXPECT_EQ(ended.error().kind, ErrorKind::refused);
+  EXPECT_EQ(
+      origin_of(session_, {}, {}, &hashes_, [](double, std::string_view) { return false; }).error().kind,
+      ErrorKind::refused);
 }
 
 TEST(Certify, PicturesWithoutASessionSaySo) {
   const test::TempFolder folder;
-  PaperSceneOptions options;
-  options.image = {48, 36};
-  options.truth_voxels = 16;
-  ASSERT_TRUE(test::write_scene(paper_scene(options), folder / "scene").ok());
+  ASSERT_TRUE(test::write_scene(paper_scene(small_film({48, 36}, 16)), folder / "scene").ok());
   test::put_bytes(folder / "response.json", "{}");
   FileHashes hashes;
   const auto origin =
-      origin_of(folder / "scene" / "transforms.json", {}, {folder / "response.json"}, &hashes);
-  ASSERT_TRUE(origin.ok()) << origin.error().message();
-  EXPECT_EQ(origin->origin(), v1::VolumeCertificate::PICTURES);
-  EXPECT_FALSE(origin->has_session());
+      value_of(origin_of(folder / "scene" / "transforms.json", {}, {folder / "response.json"}, &hashes));
+  EXPECT_EQ(origin.origin(), v1::VolumeCertificate::PICTURES);
+  EXPECT_FALSE(origin.has_session());
   std::vector<std::string> names;
-  for (const auto& file : origin->made_from()) names.push_back(file.file());
+  for (const auto& file : origin.made_from()) names.push_back(file.file());
   EXPECT_THAT(names, testing::IsSupersetOf({"response.json", "transforms.json", "view0.png"}));
 }
 

@@ -15,7 +15,9 @@
 #include "recon/render/render.h"
 #include "tests/support/devices.h"
 #include "tests/support/edit_view.h"
+#include "tests/support/key_points.h"
 #include "tests/support/posed_scene.h"
+#include "tests/support/solves.h"
 
 namespace emberlock::recon {
 namespace {
@@ -131,12 +133,10 @@ TEST_P(DescentOn, ColdSolvesTakeAConstantExtinctionForWhatItIs) {
 
 TEST_P(DescentOn, OneIterationsErrorIsThatOfWhatItMade) {
   const Scene scene = ball_of(64);
-  SolveOptions options;
-  options.iterations = 1;
+  SolveOptions options = solve_options(1);
   options.smoothness = 0.04;
-  const auto r = solve(scene, grid_over(scene.box, 12), {}, options);
-  ASSERT_TRUE(r.ok()) << r.error().message();
-  ASSERT_EQ(r->trace.size(), 1U);
+  const Reconstruction r = solved_on(scene, 12, {}, options);
+  ASSERT_EQ(r.trace.size(), 1U);
   double black = 0;
   double shown = 0;
   int views = 0;
@@ -144,15 +144,13 @@ TEST_P(DescentOn, OneIterationsErrorIsThatOfWhatItMade) {
     if (view.role != ViewRole::input) continue;
     const PixelBox box = flame_mask(*view.image, noise_threshold(*view.image)).box;
     const auto squared = [&](const RadianceImage& image) {
-      const double error = all_channels(rmse(image, *view.image, box));
-      return error * error;
+      return std::pow(all_channels(rmse(image, *view.image, box)), 2);
     };
     black += squared(RadianceImage(view.image->size));
-    shown += squared(render_view(r->volume, r->hull, {}, view.camera));
+    shown += squared(render_view(r.volume, r.hull, {}, view.camera));
     ++views;
   }
-  EXPECT_NEAR(all_channels(r->trace.back().input_rmse), std::sqrt(shown / views),
-              0.05 * std::sqrt(shown / views));
+  EXPECT_NEAR(input_error(r), std::sqrt(shown / views), 0.05 * std::sqrt(shown / views));
   EXPECT_LT(shown, 0.8 * black);
 }
 
@@ -217,17 +215,14 @@ Scene ball_before_a_wall(const Effects& effects, double light, double extinction
   const Hull medium = whole_grid(grid_over(scene.box, 16));
   const Grid& g = medium.grid;
   Volume truth{g, std::vector<float>(3 * g.size()), std::vector<float>(g.size())};
-  for (int k = 0; k < g.nz; ++k)
-    for (int j = 0; j < g.ny; ++j)
-      for (int i = 0; i < g.nx; ++i) {
-        const double sigma = g.nx / 8.0;
-        const double squares =
-            std::pow(i - g.nx / 2.0, 2) + std::pow(j - g.ny / 2.0, 2) + std::pow(k - g.nz / 2.0, 2);
-        const double share = std::exp(-squares / (2 * sigma * sigma));
-        const std::size_t p = g.index(i, j, k);
-        for (std::size_t c = 0; c < 3; ++c) truth.emission[3 * p + c] = static_cast<float>(light * share);
-        truth.extinction[p] = static_cast<float>(extinction * share);
-      }
+  each_point(g, [&](int i, int j, int k, std::size_t p) {
+    const double sigma = g.nx / 8.0;
+    const double squares =
+        std::pow(i - g.nx / 2.0, 2) + std::pow(j - g.ny / 2.0, 2) + std::pow(k - g.nz / 2.0, 2);
+    const double share = std::exp(-squares / (2 * sigma * sigma));
+    for (std::size_t c = 0; c < 3; ++c) truth.emission[3 * p + c] = static_cast<float>(light * share);
+    truth.extinction[p] = static_cast<float>(extinction * share);
+  });
   for (View& view : scene.views) view.image = share(render_view(truth, medium, effects, view.camera));
   return scene;
 }

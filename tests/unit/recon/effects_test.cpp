@@ -10,6 +10,7 @@
 #include "recon/adjust/picture_error.h"
 #include "tests/support/devices.h"
 #include "tests/support/small_flame.h"
+#include "tests/support/solves.h"
 
 namespace emberlock::recon {
 namespace {
@@ -23,11 +24,7 @@ const EffectChoice& found(PerMeter extinction, FlameShape shape) {
   const auto [at, first] = choices.try_emplace({device_here(), extinction.value(), shape});
   if (first) {
     const Scene scene = small_flame_scene(extinction, shape);
-    SolveOptions options;
-    options.compute.device = device_here();
-    auto choice = choose_effects(scene, grid_over(scene.box, 64), {}, options);
-    EXPECT_TRUE(choice.ok());
-    at->second = *choice;
+    at->second = value_of(choose_effects(scene, grid_over(scene.box, 64), {}, {}));
   }
   return at->second;
 }
@@ -45,11 +42,7 @@ TEST_P(EffectsTestSlow, WhatThePicturesTellBeatsKnowingTheExtinctionButNotWhereI
   for (const FlameShape shape : {FlameShape::plume, FlameShape::two_plumes}) {
     const Scene scene = small_flame_scene(PerMeter(32.8), shape);
     const auto heldout = [&](const Effects& effects) {
-      SolveOptions options;
-      options.compute.device = device_here();
-      const auto r = solve(scene, grid_over(scene.box, 64), effects, options);
-      EXPECT_TRUE(r.ok());
-      return all_channels(r->trace.back().heldout_rmse);
+      return held_out_error(solved_on(scene, 64, effects));
     };
     const double by_itself = heldout(found(PerMeter(32.8), shape).effects);
     EXPECT_LT(by_itself, heldout(absorbing(PerMeter(32.8))));
@@ -70,34 +63,29 @@ TEST_P(EffectsTestSlow, ConstantExtinctionIsFoundWithinAFactorOfTwo) {
 
 TEST_P(EffectsTest, SetByHandIsTakenAndItsChangePredicted) {
   const Scene scene = small_flame_scene();
-  const auto request = parse_effects("extinction=32.8");
-  ASSERT_TRUE(request.ok());
-  SolveOptions options;
-  options.compute.device = device_here();
-  const auto choice = choose_effects(scene, grid_over(scene.box, 64), *request, options);
-  ASSERT_TRUE(choice.ok());
-  EXPECT_EQ(choice->effects.extinction.value, PerMeter(32.8));
-  EXPECT_GT(choice->reports[0].predicted_change, 2);
-  EXPECT_EQ(choice->reports[0].reason, "set by hand");
+  const auto request = value_of(parse_effects("extinction=32.8"));
+  const auto choice = value_of(choose_effects(scene, grid_over(scene.box, 64), request, {}));
+  EXPECT_EQ(choice.effects.extinction.value, PerMeter(32.8));
+  EXPECT_GT(choice.reports[0].predicted_change, 2);
+  EXPECT_EQ(choice.reports[0].reason, "set by hand");
 }
 
 TEST(Effects, PicturesThatACalibrationMadeLinearAreNotBentTwice) {
   Scene scene = small_flame_scene();
   scene.linearised = true;
   for (const char* words : {"gamma=2.2", "auto:gamma=2.2"}) {
-    const auto choice = choose_effects(scene, grid_over(scene.box, 64), *parse_effects(words), {});
-    ASSERT_FALSE(choice.ok()) << words;
-    EXPECT_NE(choice.error().message().find("linear already"), std::string::npos) << choice.error().message();
+    EXPECT_THAT(choose_effects(scene, grid_over(scene.box, 64), *parse_effects(words), {}),
+                FailsWith("linear already"))
+        << words;
   }
 }
 
 TEST(Effects, WholeTableIsParsedByName) {
-  const auto request = parse_effects(
+  const auto request = value_of(parse_effects(
       "extinction=32.8,scattering=single:albedo=0.25:g=-0.3,background=10/11.5/12,exposure=0.004:rise=0.8,"
-      "refraction=curved:flame=1500:ambient=300,gamma=2.2,saturation=250,motion=1.2");
-  ASSERT_TRUE(request.ok()) << request.error().message();
+      "refraction=curved:flame=1500:ambient=300,gamma=2.2,saturation=250,motion=1.2"));
   const auto& [extinction, scattering, refraction, background, exposure, sensor, motion, light] =
-      *request->fixed;
+      *request.fixed;
   EXPECT_EQ(light.source, Light::Source::none);
   EXPECT_EQ(extinction.model, Extinction::Model::constant);
   EXPECT_EQ(extinction.value, PerMeter(32.8));
@@ -121,11 +109,7 @@ TEST(Effects, WholeTableIsParsedByName) {
 }
 
 TEST(Effects, ChoicesWithoutParametersTakeTheirDefaults) {
-  const auto fixed = [](const char* text) {
-    const auto request = parse_effects(text);
-    EXPECT_TRUE(request.ok()) << request.error().message();
-    return *request->fixed;
-  };
+  const auto fixed = [](const char* text) { return *value_of(parse_effects(text)).fixed; };
   EXPECT_EQ(fixed("extinction=field").extinction.model, Extinction::Model::field);
   EXPECT_EQ(fixed("scattering=multiple,extinction=9").scattering.order, Scattering::Order::multiple);
   EXPECT_EQ(fixed("background=image").background.kind, Background::Kind::image);
@@ -154,13 +138,12 @@ TEST(Effects, LeavingEveryEffectOutByNameIsNone) {
 }
 
 TEST(Effects, AutoTakesWhatThePicturesCannotTell) {
-  const auto request = parse_effects(
+  const auto request = value_of(parse_effects(
       "auto:albedo=0.3:g=-0.2:flame=1500:ambient=300:exposure=0.008:rise=2:gamma=2.2:white=250:tolerance=0."
-      "1");
-  ASSERT_TRUE(request.ok()) << request.error().message();
-  EXPECT_FALSE(request->fixed.has_value());
-  EXPECT_EQ(request->tolerance, 0.1);
-  const Effects& assumed = request->assumed;
+      "1"));
+  EXPECT_FALSE(request.fixed.has_value());
+  EXPECT_EQ(request.tolerance, 0.1);
+  const Effects& assumed = request.assumed;
   EXPECT_EQ(assumed.scattering.albedo, 0.3);
   EXPECT_EQ(assumed.scattering.asymmetry, -0.2);
   EXPECT_EQ(assumed.refraction.flame, Kelvin(1500));
@@ -172,78 +155,78 @@ TEST(Effects, AutoTakesWhatThePicturesCannotTell) {
 }
 
 TEST(Effects, WithNothingToldAutoAssumesNoAlbedoAndALinearSensor) {
-  const auto request = parse_effects("auto");
-  ASSERT_TRUE(request.ok());
-  EXPECT_EQ(request->tolerance, 0.5);
-  EXPECT_EQ(request->assumed.scattering.albedo, 0);
-  EXPECT_EQ(request->assumed.scattering.asymmetry, 0.6);
-  EXPECT_EQ(request->assumed.refraction.flame, Kelvin(1800));
-  EXPECT_EQ(request->assumed.exposure.time, Seconds(0));
-  EXPECT_EQ(request->assumed.sensor.gamma, 1);
-  EXPECT_EQ(request->assumed.sensor.white, 255);
+  const auto request = value_of(parse_effects("auto"));
+  EXPECT_EQ(request.tolerance, 0.5);
+  EXPECT_EQ(request.assumed.scattering.albedo, 0);
+  EXPECT_EQ(request.assumed.scattering.asymmetry, 0.6);
+  EXPECT_EQ(request.assumed.refraction.flame, Kelvin(1800));
+  EXPECT_EQ(request.assumed.exposure.time, Seconds(0));
+  EXPECT_EQ(request.assumed.sensor.gamma, 1);
+  EXPECT_EQ(request.assumed.sensor.white, 255);
 }
 
 TEST(Effects, BadListsAreRefusedWithTheTablesNames) {
-  for (const char* bad : {"",
-                          "extinction",
-                          "extinction=",
-                          "extinction=-1",
-                          "extinction=nan",
-                          "extinction=1e999",
-                          "extinction=3x",
-                          "extinction=inf",
-                          "fog=3",
-                          "extinction=1,extinction=2",
-                          "extinction=1,",
-                          ",",
-                          "extinction=1,,gamma=2",
-                          "extinction=1:albedo=1",
-                          "extinction=1:",
-                          "none,gamma=2",
-                          "auto,gamma=2",
-                          "auto:",
-                          "auto:fog=3",
-                          "auto:albedo",
-                          "auto:albedo=1.1",
-                          "auto:albedo=0.1:albedo=0.2",
-                          "auto:g=-2",
-                          "auto:exposure=-1",
-                          "auto:gamma=0",
-                          "auto:tolerance=-1",
-                          "auto:tolerance=nan",
-                          "auto=1",
-                          "automatic",
-                          "scattering=single",
-                          "scattering=some,extinction=1",
-                          "scattering=single:albedo=1.1,extinction=1",
-                          "scattering=single:g=1.1,extinction=1",
-                          "scattering=single:g=,extinction=1",
-                          "scattering=single:g,extinction=1",
-                          "scattering=single:g=0:g=0,extinction=1",
-                          "scattering=none:g=0.1",
-                          "refraction=1",
-                          "refraction=curved:flame=10",
-                          "refraction=curved:flame=nan",
-                          "refraction=straight:flame=1800",
-                          "background=1/2",
-                          "background=1/2/3/4",
-                          "background=1//3",
-                          "background=1/2/",
-                          "background=-1",
-                          "background=red",
-                          "exposure=-1",
-                          "exposure=11",
-                          "exposure=",
-                          "exposure=0.01:rise=101",
-                          "exposure=0.01:speed=1",
-                          "gamma=0",
-                          "gamma=-2.2",
-                          "gamma=nan",
-                          "gamma=none",
-                          "saturation=0",
-                          "saturation=-1",
-                          "saturation=nan",
-                          "saturation=inf"}) {
+  const char* const kBad[] = {"",
+                              "extinction",
+                              "extinction=",
+                              "extinction=-1",
+                              "extinction=nan",
+                              "extinction=1e999",
+                              "extinction=3x",
+                              "extinction=inf",
+                              "fog=3",
+                              "extinction=1,extinction=2",
+                              "extinction=1,",
+                              ",",
+                              "extinction=1,,gamma=2",
+                              "extinction=1:albedo=1",
+                              "extinction=1:",
+                              "none,gamma=2",
+                              "auto,gamma=2",
+                              "auto:",
+                              "auto:fog=3",
+                              "auto:albedo",
+                              "auto:albedo=1.1",
+                              "auto:albedo=0.1:albedo=0.2",
+                              "auto:g=-2",
+                              "auto:exposure=-1",
+                              "auto:gamma=0",
+                              "auto:tolerance=-1",
+                              "auto:tolerance=nan",
+                              "auto=1",
+                              "automatic",
+                              "scattering=single",
+                              "scattering=some,extinction=1",
+                              "scattering=single:albedo=1.1,extinction=1",
+                              "scattering=single:g=1.1,extinction=1",
+                              "scattering=single:g=,extinction=1",
+                              "scattering=single:g,extinction=1",
+                              "scattering=single:g=0:g=0,extinction=1",
+                              "scattering=none:g=0.1",
+                              "refraction=1",
+                              "refraction=curved:flame=10",
+                              "refraction=curved:flame=nan",
+                              "refraction=straight:flame=1800",
+                              "background=1/2",
+                              "background=1/2/3/4",
+                              "background=1//3",
+                              "background=1/2/",
+                              "background=-1",
+                              "background=red",
+                              "exposure=-1",
+                              "exposure=11",
+                              "exposure=",
+                              "exposure=0.01:rise=101",
+                              "exposure=0.01:speed=1",
+                              "gamma=0",
+                              "gamma=-2.2",
+                              "gamma=nan",
+                              "gamma=none",
+                              "saturation=0",
+                              "saturation=-1",
+                              "saturation=nan",
+                              "saturation=inf"};
+  for (const char* bad : kBad) {
     const auto request = parse_effects(bad);
     ASSERT_FALSE(request.ok()) << bad;
     EXPECT_EQ(request.error().where, "effects");

@@ -9,6 +9,7 @@
 
 #include "recon/kernels/planck.h"
 #include "tests/support/glowing_flame.h"
+#include "tests/support/results.h"
 
 namespace emberlock::recon {
 namespace {
@@ -128,9 +129,8 @@ TEST(Emitter, SootIsBluerThanGrey) {
 
 TEST(CameraResponse, ComesBackBitByBit) {
   CameraResponse written = test::lobes(3.3);
-  const auto read = parse_camera_response(to_json(written), "r.json");
-  ASSERT_TRUE(read.ok()) << read.error().message();
-  EXPECT_EQ(*read, written);
+  const auto read = value_of(parse_camera_response(to_json(written), "r.json"));
+  EXPECT_EQ(read, written);
 }
 
 TEST(CameraResponse, SaysWhatIsWrong) {

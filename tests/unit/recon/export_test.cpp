@@ -2,31 +2,25 @@
 #include <cmath>
 #include <filesystem>
 #include <fstream>
-#include <map>
 
 #include <gmock/gmock.h>
 #include <nlohmann/json.hpp>
-#include <unistd.h>
 
 #include "base/file.h"
 #include "recon/export/picture.h"
 #include "recon/export/report.h"
 #include "recon/export/volume_file.h"
 #include "session/media/frame_file.h"
+#include "tests/support/recording.h"
+#include "tests/support/results.h"
 
 namespace emberlock::recon {
 namespace {
 namespace fs = std::filesystem;
-using testing::HasSubstr;
 
 class ExportTest : public testing::Test {
  protected:
-  void SetUp() override {
-    root_ = fs::temp_directory_path() / ("emberlock_export_test." + std::to_string(::getpid()));
-    fs::create_directories(root_);
-  }
-  void TearDown() override { fs::remove_all(root_); }
-  fs::path root_;
+  const test::TempFolder root_;
 };
 
 Volume some_volume() {
@@ -45,15 +39,14 @@ Volume some_volume() {
 TEST_F(ExportTest, AVolumeIsReadBackToTheSameBits) {
   const Volume written = some_volume();
   ASSERT_TRUE(write_volume(written, root_ / "volume.vdb").ok());
-  const auto read = read_volume(root_ / "volume.vdb");
-  ASSERT_TRUE(read.ok()) << read.error().message();
-  EXPECT_EQ(read->emission, written.emission);
-  EXPECT_EQ(read->extinction, written.extinction);
-  for (int axis = 0; axis < 3; ++axis) EXPECT_EQ(read->grid.origin[axis], written.grid.origin[axis]);
-  EXPECT_EQ(read->grid.edge, written.grid.edge);
-  EXPECT_EQ(read->grid.nx, 5);
-  EXPECT_EQ(read->grid.ny, 9);
-  EXPECT_EQ(read->grid.nz, 3);
+  const auto read = value_of(read_volume(root_ / "volume.vdb"));
+  EXPECT_EQ(read.emission, written.emission);
+  EXPECT_EQ(read.extinction, written.extinction);
+  for (int axis = 0; axis < 3; ++axis) EXPECT_EQ(read.grid.origin[axis], written.grid.origin[axis]);
+  EXPECT_EQ(read.grid.edge, written.grid.edge);
+  EXPECT_EQ(read.grid.nx, 5);
+  EXPECT_EQ(read.grid.ny, 9);
+  EXPECT_EQ(read.grid.nz, 3);
 }
 
 TEST_F(ExportTest, EqualVolumesAreEqualFilesAndUnequalOnesTellThemselvesApart) {
@@ -74,9 +67,8 @@ TEST_F(ExportTest, WithoutExtinctionTheDensityIsEmptyButThere) {
   Volume volume = some_volume();
   volume.extinction.clear();
   ASSERT_TRUE(write_volume(volume, root_ / "volume.vdb").ok());
-  const auto read = read_volume(root_ / "volume.vdb");
-  ASSERT_TRUE(read.ok()) << read.error().message();
-  EXPECT_TRUE(read->extinction.empty());
+  const auto read = value_of(read_volume(root_ / "volume.vdb"));
+  EXPECT_TRUE(read.extinction.empty());
 }
 
 TEST_F(ExportTest, FurtherGridsAreReadBackToTheSameBitsAndLeaveTheVolumeAsItWas) {
@@ -90,9 +82,7 @@ TEST_F(ExportTest, FurtherGridsAreReadBackToTheSameBitsAndLeaveTheVolumeAsItWas)
   EXPECT_EQ(*read_grid(root_ / "volume.vdb", "emission_sigma"), volume.emission);
   EXPECT_EQ(read_volume(root_ / "volume.vdb")->emission, volume.emission);
   EXPECT_EQ(read_volume(root_ / "volume.vdb")->extinction, volume.extinction);
-  const auto missing = read_grid(root_ / "volume.vdb", "velocity");
-  ASSERT_FALSE(missing.ok());
-  EXPECT_NE(missing.error().message().find("velocity"), std::string::npos);
+  EXPECT_THAT(read_grid(root_ / "volume.vdb", "velocity"), FailsWith("velocity"));
 }
 
 TEST_F(ExportTest, ASparseFlameTakesLittleRoom) {
@@ -105,7 +95,7 @@ TEST_F(ExportTest, ASparseFlameTakesLittleRoom) {
 }
 
 TEST_F(ExportTest, AFileThatIsNoVolumeIsNamed) {
-  EXPECT_THAT(read_volume(root_ / "absent.vdb").error().message(), HasSubstr("absent.vdb"));
+  EXPECT_THAT(read_volume(root_ / "absent.vdb"), FailsWith("absent.vdb"));
   std::ofstream(root_ / "text.vdb") << "no volume";
   EXPECT_FALSE(read_volume(root_ / "text.vdb").ok());
   ASSERT_TRUE(write_volume(some_volume(), root_ / "cut.vdb").ok());
@@ -122,9 +112,8 @@ TEST_F(ExportTest, APictureIsReadBackWithItsColours) {
   for (std::size_t i = 0; i < picture.bytes().size(); ++i)
     picture.bytes()[i] = static_cast<std::byte>(17 * i);
   ASSERT_TRUE(write_png(picture.view(), root_ / "p.png").ok());
-  const auto read = session::read_image(root_ / "p.png");
-  ASSERT_TRUE(read.ok()) << read.error().message();
-  EXPECT_EQ(*read, picture);
+  const auto read = value_of(session::read_image(root_ / "p.png"));
+  EXPECT_EQ(read, picture);
 }
 
 TEST_F(ExportTest, APictureOf16BitsIsRefused) {

@@ -11,6 +11,8 @@
 #include "recon/hull/hull.h"
 #include "recon/render/render.h"
 #include "tests/support/devices.h"
+#include "tests/support/key_points.h"
+#include "tests/support/march_case.h"
 
 namespace emberlock::recon {
 namespace {
@@ -22,21 +24,6 @@ Exposure moving(double way, const Grid& grid) {  // voxel edges
 }
 
 Grid box_grid(int voxels) { return grid_over({Eigen::Vector3d::Zero(), {0.08, 0.08, 0.2}}, voxels); }
-
-std::vector<Rgba> random_field(std::size_t size, std::uint64_t seed) {
-  std::vector<Rgba> out(size);
-  for (std::size_t i = 0; i < size; ++i)
-    for (std::size_t c = 0; c < 4; ++c) out[i].c[c] = static_cast<float>(random_uniform(seed, c, i));
-  return out;
-}
-
-double dot(const std::vector<Rgba>& a, const std::vector<Rgba>& b) {
-  double sum = 0;
-  for (std::size_t i = 0; i < a.size(); ++i)
-    for (std::size_t c = 0; c < 4; ++c)
-      sum += static_cast<double>(a[i].c[c]) * static_cast<double>(b[i].c[c]);
-  return sum;
-}
 
 TEST(Exposure, MotionBelowHalfAnEdgeIsLeftOut) {
   const Grid grid = box_grid(20);
@@ -68,12 +55,12 @@ TEST(Exposure, WeightsKeepTheLightAndSpreadItAsTheMotionDoes) {
 TEST_P(ExposureTest, AdjointIsTheTranspose) {
   const Grid grid = box_grid(20);
   Pool pool(2, device_here());
-  const auto x = random_field(grid.size(), 1);
-  const auto y = random_field(grid.size(), 2);
+  const auto x = random_quads<float>(grid.size(), 1, 1, 1);
+  const auto y = random_quads<float>(grid.size(), 2, 1, 1);
   for (const double way : {0.6, 2.0, 3.7, 100.0}) {
     const ExposureBlur blur(moving(way, grid), grid);
-    const double forward = dot(blur.forward(x, pool), y);
-    EXPECT_NEAR(forward / dot(x, blur.adjoint(y, pool)), 1, 1e-6) << way;
+    const double forward = dot(blur.forward(x, pool), y, 4);
+    EXPECT_NEAR(forward / dot(x, blur.adjoint(y, pool), 4), 1, 1e-6) << way;
     EXPECT_GT(forward, 0);
   }
 }
@@ -81,7 +68,7 @@ TEST_P(ExposureTest, AdjointIsTheTranspose) {
 TEST_P(ExposureTest, SameBitsForAnyNumberOfThreads) {
   const Grid grid = box_grid(20);
   const ExposureBlur blur(moving(3.7, grid), grid);
-  const auto x = random_field(grid.size(), 1);
+  const auto x = random_quads<float>(grid.size(), 1, 1, 1);
   std::vector<std::vector<Rgba>> results;
   for (const int threads : {1, 2, 16}) {
     Pool pool(threads, device_here());
@@ -98,35 +85,27 @@ TEST_P(ExposureTest, SameBitsForAnyNumberOfThreads) {
 Volume blob(const Grid& grid, double wavelength, double shift) {
   Volume v{grid, std::vector<float>(3 * grid.size()), {}};
   v.grid.origin[2] += static_cast<float>(shift);
-  for (int k = 0; k < grid.nz; ++k)
-    for (int j = 0; j < grid.ny; ++j)
-      for (int i = 0; i < grid.nx; ++i)
-        for (int c = 0; c < 3; ++c) {
-          const auto edge = static_cast<double>(grid.edge);
-          const double x = static_cast<double>(grid.origin[0]) + edge * i;
-          const double y = static_cast<double>(grid.origin[1]) + edge * j;
-          const double z = static_cast<double>(grid.origin[2]) + edge * k;
-          const double wave = 1 + std::cos(2 * std::numbers::pi * z / wavelength + c);
-          const double envelope = std::exp(-(x * x + y * y) / 6e-4 - z * z * z * z / 4e-6);
-          v.emission[3 * grid.index(i, j, k) + static_cast<std::size_t>(c)] =
-              static_cast<float>(3000 * wave * envelope);
-        }
+  each_point(grid, [&](int i, int j, int k, std::size_t p) {
+    const Eigen::Vector3d at = place_of(grid, i, j, k);
+    const double envelope = std::exp(-at.head<2>().squaredNorm() / 6e-4 - std::pow(at.z(), 4) / 4e-6);
+    for (std::size_t c = 0; c < 3; ++c) {
+      const double wave = 1 + std::cos(2 * std::numbers::pi * at.z() / wavelength + static_cast<double>(c));
+      v.emission[3 * p + c] = static_cast<float>(3000 * wave * envelope);
+    }
+  });
   return v;
 }
 
 /// The voxels of an ellipsoid around the blob.
 Hull ellipsoid(const Grid& grid) {
   Hull hull = whole_grid(grid);
-  std::size_t at = 0;
-  for (int k = 0; k < grid.nz - 1; ++k)
-    for (int j = 0; j < grid.ny - 1; ++j)
-      for (int i = 0; i < grid.nx - 1; ++i) {
-        const double x = 2.0 * (i + 0.5) / (grid.nx - 1) - 1;
-        const double y = 2.0 * (j + 0.5) / (grid.ny - 1) - 1;
-        const double z = 2.0 * (k + 0.5) / (grid.nz - 1) - 1;
-        hull.inside[at++] = x * x + y * y + z * z < 0.7 ? 1 : 0;
-      }
-  hull.count = static_cast<std::size_t>(std::count(hull.inside.begin(), hull.inside.end(), 1));
+  hull.count = 0;
+  const Eigen::Vector3d size(grid.nx - 1, grid.ny - 1, grid.nz - 1);
+  each_point(voxels_of(grid), [&](int i, int j, int k, std::size_t v) {
+    const Eigen::Vector3d place = 2 * Eigen::Vector3d(i + 0.5, j + 0.5, k + 0.5).cwiseQuotient(size);
+    hull.inside[v] = (place - Eigen::Vector3d::Ones()).squaredNorm() < 0.7 ? 1 : 0;
+    hull.count += hull.inside[v];
+  });
   return hull;
 }
 

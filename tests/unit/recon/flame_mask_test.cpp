@@ -10,6 +10,7 @@
 #include "recon/preprocess/radiance.h"
 #include "recon/views/view.h"
 #include "tests/support/devices.h"
+#include "tests/support/pictures.h"
 #include "tests/support/small_flame.h"
 
 namespace emberlock::recon {
@@ -17,16 +18,12 @@ namespace {
 
 /// Noise on a background, with a bright disc that crosses the picture's border and single bright pixels.
 RadianceImage noisy_picture(ImageSize size, std::uint64_t seed) {
-  RadianceImage image(size);
-  for (int y = 0; y < size.height; ++y)
-    for (int x = 0; x < size.width; ++x) {
-      const auto p = static_cast<std::uint64_t>(y * size.width + x);
-      const bool lit =
-          std::hypot(x, y - size.height / 2) < size.width / 3.0 || random_bits(seed, 3, p) % 40 == 0;
-      for (std::size_t c = 0; c < 3; ++c)
-        image.rgb[3 * p + c] = static_cast<float>((lit ? 30 : 5) + random_normal(seed, c, p));
-    }
-  return image;
+  return radiance_of(size, [&](int x, int y, int c) {
+    const auto p = static_cast<std::uint64_t>(y * size.width + x);
+    const bool lit =
+        std::hypot(x, y - size.height / 2) < size.width / 3.0 || random_bits(seed, 3, p) % 40 == 0;
+    return (lit ? 30 : 5) + random_normal(seed, static_cast<std::uint64_t>(c), p);
+  });
 }
 
 float brightest(const RadianceImage& image, int x, int y) {
@@ -62,9 +59,12 @@ double threshold_by_blocks(const RadianceImage& image) {
          std::max(1.0, 6 / (std::sqrt(2 * std::log(edge * edge)) - 0.5) * (upper_median(peaks) - background));
 }
 
+std::array<int, 4> corners(const PixelBox& box) { return {box.x0, box.y0, box.x1, box.y1}; }
+
+constexpr ImageSize kSizes[] = {{64, 48}, {37, 29}, {203, 61}, {5, 4}, {4, 7}, {3, 9}, {1, 1}, {2, 40}};
+
 TEST(FlameMask, EqualsWhatLookingAtEachPixelAndItsNeighboursFinds) {
-  const ImageSize sizes[] = {{64, 48}, {37, 29}, {203, 61}, {5, 4}, {4, 7}, {3, 9}, {1, 1}, {2, 40}};
-  for (const ImageSize size : sizes) {
+  for (const ImageSize size : kSizes) {
     const RadianceImage image = noisy_picture(size, static_cast<std::uint64_t>(size.width));
     const FlameMask mask = noise_mask(image);
     const double threshold = threshold_by_blocks(image);
@@ -84,10 +84,7 @@ TEST(FlameMask, EqualsWhatLookingAtEachPixelAndItsNeighboursFinds) {
           box = {std::min(box.x0, x), std::min(box.y0, y), std::max(box.x1, x + 1), std::max(box.y1, y + 1)};
       }
     if (box.empty()) box = {};
-    EXPECT_EQ(mask.box.x0, box.x0);
-    EXPECT_EQ(mask.box.y0, box.y0);
-    EXPECT_EQ(mask.box.x1, box.x1);
-    EXPECT_EQ(mask.box.y1, box.y1);
+    EXPECT_EQ(corners(mask.box), corners(box));
   }
 }
 
@@ -103,8 +100,7 @@ TEST(FlameMaskThreads, OfAllViewsAreTheSameOnAnyNumberOfThreads) {
 
 TEST(FlameMaskThreads, OfAllViewsAreTheSameOnAnyDevice) {
   Scene scene = small_flame_scene();
-  for (const ImageSize size :
-       {ImageSize{64, 48}, {37, 29}, {203, 61}, {5, 4}, {4, 7}, {3, 9}, {1, 1}, {2, 40}})
+  for (const ImageSize size : kSizes)
     scene.views.push_back({"noise", {}, share(noisy_picture(size, static_cast<std::uint64_t>(size.height)))});
   const std::optional<double> thresholds[] = {{}, 30, 1000, -1};
   for (const std::optional<double>& threshold : thresholds) {
@@ -115,19 +111,14 @@ TEST(FlameMaskThreads, OfAllViewsAreTheSameOnAnyDevice) {
         EXPECT_EQ(there[v].flame, here[v].flame) << "view " << v;
         EXPECT_EQ(there[v].threshold, here[v].threshold);
         EXPECT_EQ(there[v].size.width, here[v].size.width);
-        EXPECT_EQ(there[v].box.x0, here[v].box.x0) << "view " << v;
-        EXPECT_EQ(there[v].box.y0, here[v].box.y0);
-        EXPECT_EQ(there[v].box.x1, here[v].box.x1);
-        EXPECT_EQ(there[v].box.y1, here[v].box.y1);
+        EXPECT_EQ(corners(there[v].box), corners(here[v].box)) << "view " << v;
       }
     }
   }
 }
 
 TEST(FlameMask, ThresholdComesFromTheNoise) {
-  PaperSceneOptions options;
-  options.image = {160, 120};
-  options.truth_voxels = 48;
+  PaperSceneOptions options = small_film({160, 120}, 48);
   EXPECT_DOUBLE_EQ(noise_threshold(*paper_scene(options).views[0].image), 1);
   options.noise = 2;
   const double threshold = noise_threshold(*paper_scene(options).views[0].image);
@@ -137,13 +128,9 @@ TEST(FlameMask, ThresholdComesFromTheNoise) {
 
 TEST(FlameMask, ThresholdOfADemosaicedPictureLiesAboveItsNoise) {
   // Interpolated samples share their neighbours' noise: differences of neighbours would see half of it.
-  Image mosaic({{320, 240}, PixelFormat::bayer_rggb8, 8});
-  for (int y = 0; y < 240; ++y)
-    for (int x = 0; x < 320; ++x) {
-      const int pixel = y * 320 + x;
-      mosaic.row_as<std::uint8_t>(y)[x] = static_cast<std::uint8_t>(
-          std::lround(20 + 2 * random_normal(1, 0, static_cast<std::uint64_t>(pixel))));
-    }
+  const Image mosaic = image_of({{320, 240}, PixelFormat::bayer_rggb8, 8}, [](int x, int y, int /*c*/) {
+    return std::lround(20 + 2 * random_normal(1, 0, static_cast<std::uint64_t>(y * 320 + x)));
+  });
   const RadianceImage image = to_radiance(mosaic.view());
   EXPECT_GT(noise_threshold(image), 20 + 4 * 2);
   EXPECT_TRUE(noise_mask(image).box.empty());

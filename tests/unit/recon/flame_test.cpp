@@ -5,6 +5,9 @@
 
 #include <gtest/gtest.h>
 
+#include "tests/support/key_points.h"
+#include "tests/support/small_flame.h"
+
 namespace emberlock::recon {
 namespace {
 
@@ -24,14 +27,12 @@ TEST(Flame, EmitsOnlyInsideItsMediumAndClearOfTheBox) {
     options.shape = shape;
     const FlameTruth truth = Flame(options).at(Seconds(0), kGrid);
     EXPECT_GT(truth.medium.count, 300u);
-    for (int k = 0; k < kGrid.nz; ++k)
-      for (int j = 0; j < kGrid.ny; ++j)
-        for (int i = 0; i < kGrid.nx; ++i) {
-          if (truth.volume.emission[3 * kGrid.index(i, j, k)] <= 0) continue;
-          ASSERT_TRUE(i > 0 && j > 0 && k > 0 && i < kGrid.nx - 1 && j < kGrid.ny - 1 && k < kGrid.nz - 1);
-          const int voxel = i + (kGrid.nx - 1) * (j + (kGrid.ny - 1) * k);
-          ASSERT_EQ(truth.medium.inside[static_cast<std::size_t>(voxel)], 1);
-        }
+    each_point(kGrid, [&](int i, int j, int k, std::size_t p) {
+      if (truth.volume.emission[3 * p] <= 0) return;
+      ASSERT_TRUE(i > 0 && j > 0 && k > 0 && i < kGrid.nx - 1 && j < kGrid.ny - 1 && k < kGrid.nz - 1);
+      const int voxel = i + (kGrid.nx - 1) * (j + (kGrid.ny - 1) * k);
+      ASSERT_EQ(truth.medium.inside[static_cast<std::size_t>(voxel)], 1);
+    });
   }
 }
 
@@ -51,14 +52,9 @@ TEST(Flame, ChangesSmoothlyAsItRises) {
 }
 
 TEST(PaperScene, IsTheTenPlusOneViewsOfThePaper) {
-  PaperSceneOptions options;
-  options.image = {64, 48};
-  options.truth_voxels = 32;
-  const Scene scene = paper_scene(options);
+  const Scene scene = paper_scene(small_film({64, 48}, 32));
   ASSERT_EQ(scene.views.size(), 11u);
-  EXPECT_EQ(std::count_if(scene.views.begin(), scene.views.end(),
-                          [](const View& v) { return v.role == ViewRole::held_out; }),
-            1);
+  EXPECT_EQ(std::ranges::count(scene.views, ViewRole::held_out, &View::role), 1);
   for (const View& view : scene.views) {
     EXPECT_NEAR(view.camera.center().norm(), 0.3, 1e-9);
     const float brightest = *std::max_element(view.image->rgb.begin(), view.image->rgb.end());
@@ -68,9 +64,7 @@ TEST(PaperScene, IsTheTenPlusOneViewsOfThePaper) {
 }
 
 TEST(PaperScene, AnyNumberOfCamerasStandsEvenlyAroundTheSameHeldOutView) {
-  PaperSceneOptions options;
-  options.image = {32, 24};
-  options.truth_voxels = 16;
+  PaperSceneOptions options = small_film({32, 24}, 16);
   const Scene ten = paper_scene(options);
   for (const int cameras : {3, 4, 7, 16}) {
     options.cameras = cameras;
@@ -90,9 +84,7 @@ TEST(PaperScene, AnyNumberOfCamerasStandsEvenlyAroundTheSameHeldOutView) {
 }
 
 TEST(PaperScene, AnExposureIsTheMeanOfItsInstants) {
-  PaperSceneOptions options;
-  options.image = {32, 24};
-  options.truth_voxels = 16;
+  PaperSceneOptions options = small_film({32, 24}, 16);
   const auto at = [&](double ms) {
     PaperSceneOptions o = options;
     o.time = milliseconds(ms);

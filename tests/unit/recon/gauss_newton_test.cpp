@@ -9,6 +9,7 @@
 #include <gtest/gtest.h>
 
 #include "base/random.h"
+#include "tests/support/key_points.h"
 #include "tests/support/march_case.h"
 #include "tests/support/posed_scene.h"
 
@@ -122,13 +123,8 @@ class GaussNewtonTest : public testing::TestWithParam<Extinction::Model> {
         act(inside ? g.index(a, b, c) : 0, inside);
       }
     };
-    const auto each_point = [&](const auto& act) {
-      for (int k = 0; k < g.nz; ++k)
-        for (int j = 0; j < g.ny; ++j)
-          for (int i = 0; i < g.nx; ++i) act(i, j, k, g.index(i, j, k));
-    };
     std::vector<double> stiff(x_.size());
-    each_point([&](int i, int j, int k, std::size_t p) {
+    each_point(g, [&](int i, int j, int k, std::size_t p) {
       double squares = 0;
       each_neighbour(i, j, k, [&](std::size_t q, bool inside) {
         for (int c = 0; c < 3; ++c)
@@ -139,7 +135,7 @@ class GaussNewtonTest : public testing::TestWithParam<Extinction::Model> {
       if (ties_at_.weights[p] > 0)
         stiff[p] = static_cast<double>(ties_at_.ties.most) / 2 * std::min(1.0, soft / steep);
     });
-    each_point([&](int i, int j, int k, std::size_t p) {
+    each_point(g, [&](int i, int j, int k, std::size_t p) {
       each_neighbour(i, j, k, [&](std::size_t q, bool inside) {
         for (int c = 0; c < lanes(); ++c) {
           double t = inside ? stiff[p] + stiff[q] : stiff[p];

@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "recon/temperature/glow_cost.h"
 
-#include <cmath>
-
 #include <gtest/gtest.h>
 
 #include "tests/support/glowing_flame.h"
@@ -15,6 +13,8 @@ const EmitterColours& colours() {
   static const EmitterColours soot(EmitterTable(test::lobes(), Emitter::soot));
   return soot;
 }
+
+constexpr GlowTies kTied{0.3, 0.2};
 
 /// Two views of a medium with holes, of which one key point in seven doesn't glow as soot does.
 class GlowCostTest : public testing::Test {
@@ -47,6 +47,16 @@ class GlowCostTest : public testing::Test {
     options.subsets = options.rule.dealt = subsets;
     return make_problem({&views_[0], &views_[1]}, medium_, options, pool_);
   }
+  [[nodiscard]] GlowCost<double> tied(const Problem& problem, const GlowStart& start, Pool& pool) const {
+    GlowCost<double> cost(problem, start, colours(), pool);
+    cost.weigh(at_, kTied);
+    return cost;
+  }
+  /// Of costs, central.
+  [[nodiscard]] double difference(GlowCost<double>& cost, double way) const {
+    GlowField<double> unused;
+    return (cost(beyond(way), unused) - cost(beyond(-way), unused)) / (2 * way);
+  }
   [[nodiscard]] GlowField<double> beyond(double way) const {
     GlowField<double> out = at_;
     for (std::size_t p = 0; p < out.kelvin.size(); ++p) {
@@ -73,7 +83,6 @@ class GlowCostTest : public testing::Test {
 };
 
 constexpr Absorb kAbsorbs[] = {Absorb::nothing, Absorb::constant, Absorb::field};
-constexpr GlowTies kTied{0.3, 0.2};
 
 /// Richardson's extrapolation of central differences of the double-precision march.
 TEST_F(GlowCostTest, GradientIsExactUnderEveryExtinction) {
@@ -81,16 +90,10 @@ TEST_F(GlowCostTest, GradientIsExactUnderEveryExtinction) {
     GlowStart start = start_;
     start.absorb = absorb;
     start.sigma = 0.05;
-    GlowCost<double> cost(problem_, start, colours(), pool_);
-    cost.weigh(at_, kTied);
+    GlowCost<double> cost = tied(problem_, start, pool_);
     GlowField<double> slope;
-    GlowField<double> unused;
     cost(at_, slope);
-    const auto difference = [&](double way) {
-      return (cost(beyond(way), unused) - cost(beyond(-way), unused)) / (2 * way);
-    };
-    constexpr double kWay = 1e-3;
-    const double expected = (4 * difference(kWay) - difference(2 * kWay)) / 3;
+    const double expected = (4 * difference(cost, 1e-3) - difference(cost, 2e-3)) / 3;
     EXPECT_NEAR(along(slope) / expected, 1, 1e-7) << static_cast<int>(absorb);
 
     GlowCost<float> single(problem_, start, colours(), pool_);
@@ -106,16 +109,12 @@ TEST_F(GlowCostTest, GradientIsExactUnderEveryExtinction) {
 TEST_F(GlowCostTest, GradientIsExactWherePixelsAreBounds) {
   start_.absorb = Absorb::field;
   start_.white = 2;  // of pictures up to 3
-  GlowCost<double> cost(problem_, start_, colours(), pool_);
-  cost.weigh(at_, kTied);
+  GlowCost<double> cost = tied(problem_, start_, pool_);
   GlowField<double> slope;
-  GlowField<double> unused;
   cost(at_, slope);
   // A residual has a kink where a bound begins to be met: the differences are only as good as few of them are
   // crossed.
-  constexpr double kWay = 1e-5;
-  const double difference = (cost(beyond(kWay), unused) - cost(beyond(-kWay), unused)) / (2 * kWay);
-  EXPECT_NEAR(along(slope) / difference, 1, 1e-4);
+  EXPECT_NEAR(along(slope) / difference(cost, 1e-5), 1, 1e-4);
 }
 
 TEST_F(GlowCostTest, IsTheSameInOnePartOrInMany) {
@@ -127,8 +126,7 @@ TEST_F(GlowCostTest, IsTheSameInOnePartOrInMany) {
     for (const int subsets : {1, 7}) {
       const Problem problem = of_subsets(subsets);
       ASSERT_EQ(problem.list.subsets(), subsets);
-      GlowCost<double> cost(problem, start_, colours(), pool_);
-      cost.weigh(at_, kTied);
+      GlowCost<double> cost = tied(problem, start_, pool_);
       costs.push_back(cost(at_, slopes[costs.size()]));
     }
     EXPECT_NEAR(costs[1] / costs[0], 1, 1e-10);
@@ -138,8 +136,7 @@ TEST_F(GlowCostTest, IsTheSameInOnePartOrInMany) {
 
 TEST_F(GlowCostTest, AStepLowersTheCostAndMovesOnlyWhatGlows) {
   start_.absorb = Absorb::field;
-  GlowCost<double> cost(problem_, start_, colours(), pool_);
-  cost.weigh(at_, kTied);
+  GlowCost<double> cost = tied(problem_, start_, pool_);
   GlowField<double> slope;
   GlowField<double> next = at_;
   const double before = cost(at_, slope);
@@ -154,8 +151,7 @@ TEST_F(GlowCostTest, HasTheSameBitsForEveryNumberOfThreads) {
   std::vector<GlowField<double>> slopes(2);
   for (const int threads : {1, 3}) {
     Pool pool(threads);
-    GlowCost<double> cost(problem_, start_, colours(), pool);
-    cost.weigh(at_, kTied);
+    GlowCost<double> cost = tied(problem_, start_, pool);
     costs.push_back(cost(at_, slopes[costs.size()]));
   }
   EXPECT_EQ(costs[0], costs[1]);

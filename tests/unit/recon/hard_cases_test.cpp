@@ -12,6 +12,7 @@
 #include "recon/render/render.h"
 #include "tests/support/camera_at.h"
 #include "tests/support/devices.h"
+#include "tests/support/key_points.h"
 #include "tests/support/march_case.h"
 
 namespace emberlock::recon {
@@ -200,9 +201,7 @@ TEST(MarchHardCase, TheFarCornerOf512CubedVoxelsLooksAsInAGridOfItsOwn) {
   const auto far_index = [&](int i, int j, int k) {
     return large.grid.index(i + 512 - kCorner, j + 512 - kCorner, k + 512 - kCorner);
   };
-  for (int k = 0; k < g.nz; ++k)
-    for (int j = 0; j < g.ny; ++j)
-      for (int i = 0; i < g.nx; ++i) volume.data()[far_index(i, j, k)] = values[g.index(i, j, k)];
+  each_point(g, [&](int i, int j, int k, std::size_t p) { volume.data()[far_index(i, j, k)] = values[p]; });
   const RayList list = clip_rays({&camera}, large, {}, pool);
   std::vector<Rgba> seen(list.rays.size());
   MarchWork<float> work;
@@ -220,11 +219,10 @@ TEST(MarchHardCase, TheFarCornerOf512CubedVoxelsLooksAsInAGridOfItsOwn) {
   }
   for (std::uint32_t run = 0; run < list.runs.size(); ++run)
     march_table<float>().adjoint_of(Absorb::nothing, Travel::straight)(work, &run, 1);
-  for (int k = 0; k < g.nz; ++k)
-    for (int j = 0; j < g.ny; ++j)
-      for (int i = 0; i < g.nx; ++i)
-        right += static_cast<double>(volume.data()[far_index(i, j, k)].c[1]) *
-                 static_cast<double>(gradient.data()[far_index(i, j, k)].c[1]);
+  each_point(g, [&](int i, int j, int k) {
+    right += static_cast<double>(volume.data()[far_index(i, j, k)].c[1]) *
+             static_cast<double>(gradient.data()[far_index(i, j, k)].c[1]);
+  });
   EXPECT_NEAR(left / right, 1, 1e-6);
 #ifndef EMBERLOCK_SANITIZED  // whose shadow is memory too
   EXPECT_LT(resident_bytes(), before + (std::size_t{64} << 20)) << "of the 4 GiB that could be touched";

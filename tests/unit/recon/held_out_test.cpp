@@ -11,6 +11,7 @@
 #include "tests/support/devices.h"
 #include "tests/support/edit_view.h"
 #include "tests/support/small_flame.h"
+#include "tests/support/solves.h"
 
 namespace emberlock::recon {
 namespace {
@@ -22,32 +23,21 @@ const Effects kHeldOutMedium = absorbing(PerMeter(32.8));
 
 /// Pictures large enough that a sample is few of their pixels.
 Scene scene_with_two_held_out() {
-  PaperSceneOptions film;
-  film.image = {320, 240};
-  film.truth_voxels = 64;
-  Scene scene = paper_scene(film);
+  Scene scene = paper_scene(small_film({320, 240}));
   scene.views[3].role = ViewRole::held_out;
   return scene;
 }
 
-Reconstruction solved_here(const Scene& scene, SolveOptions options, int voxels = 48) {
-  options.compute.device = device_here();
-  auto r = solve(scene, grid_over(scene.box, voxels), kHeldOutMedium, options);
-  EXPECT_TRUE(r.ok());
-  return r ? std::move(*r) : Reconstruction{};
-}
-
-SolveOptions at_most_iterations(int iterations, SolveOptions::Trace trace = SolveOptions::Trace::sampled) {
-  SolveOptions options;
-  options.iterations = iterations;
-  options.trace = trace;
-  return options;
+Reconstruction solved_here(const Scene& scene, const SolveOptions& options, int voxels = 48) {
+  return solved_on(scene, voxels, kHeldOutMedium, options);
 }
 
 TEST_P(HeldOutTraceThreads, IsAnEstimateFromFewPixelsThatEndsAtTheErrorOfAll) {
   const Scene scene = scene_with_two_held_out();
-  const Reconstruction sampled = solved_here(scene, at_most_iterations(5));
-  const Reconstruction whole = solved_here(scene, at_most_iterations(5, SolveOptions::Trace::whole));
+  SolveOptions options = solve_options(5);
+  const Reconstruction sampled = solved_here(scene, options);
+  options.trace = SolveOptions::Trace::whole;
+  const Reconstruction whole = solved_here(scene, options);
   EXPECT_EQ(sampled.volume.emission, whole.volume.emission) << "who watches changes nothing";
   EXPECT_EQ(whole.trace_sample.pixels, whole.trace_sample.of);
   EXPECT_EQ(sampled.trace_sample.of, whole.trace_sample.of);
@@ -68,7 +58,7 @@ TEST_P(HeldOutTraceThreads, IsAnEstimateFromFewPixelsThatEndsAtTheErrorOfAll) {
 TEST_P(HeldOutTraceThreads, ATargetIsReachedByAllPixelsNotByTheSample) {
   Scene scene = scene_with_two_held_out();
   scene.views[3].role = ViewRole::input;
-  const Reconstruction before = solved_here(scene, at_most_iterations(4));
+  const Reconstruction before = solved_here(scene, solve_options(4));
   const int stride = static_cast<int>(std::lround(std::sqrt(
       static_cast<double>(before.trace_sample.of) / static_cast<double>(before.trace_sample.pixels))));
   ASSERT_GT(stride, 1);
@@ -82,7 +72,7 @@ TEST_P(HeldOutTraceThreads, ATargetIsReachedByAllPixelsNotByTheSample) {
             if (value > 20) value += 25;
           }
   });
-  SolveOptions options = at_most_iterations(4);
+  SolveOptions options = solve_options(4);
   options.target_rmse = 1.5 * reached;
   const Reconstruction r = solved_here(scene, options);
   EXPECT_EQ(r.iterations, 4) << "the sample alone would have stopped it";
@@ -172,9 +162,7 @@ TEST_P(HeldOutTraceThreads, TakesATwentiethOfTheFittedPixelsHoweverManyViewsAreH
     fitted += static_cast<std::size_t>((box.x1 - box.x0) * (box.y1 - box.y0));
   }
   for (const Solver solver : {Solver::standard, Solver::paper}) {
-    SolveOptions options = at_most_iterations(1);
-    options.solver = solver;
-    const Reconstruction r = solved_here(scene, options, 96);
+    const Reconstruction r = solved_here(scene, solve_options(1, solver), 96);
     const double most = std::max(HeldOut::kFewest, static_cast<double>(fitted) / HeldOut::kFittedForOne);
     EXPECT_LE(static_cast<double>(r.trace_sample.pixels), 1.1 * most);
     EXPECT_GE(static_cast<double>(r.trace_sample.of), 4 * most);

@@ -8,6 +8,8 @@
 #include "recon/views/check_scene.h"
 #include "tests/support/devices.h"
 #include "tests/support/edit_view.h"
+#include "tests/support/key_points.h"
+#include "tests/support/results.h"
 #include "tests/support/small_flame.h"
 
 namespace emberlock::recon {
@@ -22,10 +24,8 @@ bool stays(const Scene& scene, const std::vector<FlameMask>& masks, const Grid& 
     Eigen::Vector2d low(1e9, 1e9);
     Eigen::Vector2d high(-1e9, -1e9);
     for (int c = 0; c < 8; ++c) {
-      const Eigen::Vector3d p =
-          Eigen::Vector3d(g.origin[0], g.origin[1], g.origin[2]) +
-          static_cast<double>(g.edge) * Eigen::Vector3d(i + (c & 1), j + (c >> 1 & 1), k + (c >> 2));
-      const Eigen::Vector2d pixel = scene.views[v].camera.project(p);
+      const Eigen::Vector2d pixel =
+          scene.views[v].camera.project(place_of(g, i + (c & 1), j + (c >> 1 & 1), k + (c >> 2)));
       low = low.cwiseMin(pixel);
       high = high.cwiseMax(pixel);
     }
@@ -44,16 +44,13 @@ TEST_P(HullTest, EqualsTheBruteForceProjectionOfEveryVoxel) {
   const Scene scene = small_flame_scene();
   const std::vector<FlameMask> masks = flame_masks(scene);
   const Grid grid = grid_over(scene.box, 37);
-  const auto hull = carve(scene, masks, grid, {});
-  ASSERT_TRUE(hull.ok());
-  std::size_t voxel = 0;
+  const auto hull = value_of(carve(scene, masks, grid, {}));
   std::size_t different = 0;
-  for (int k = 0; k < grid.nz - 1; ++k)
-    for (int j = 0; j < grid.ny - 1; ++j)
-      for (int i = 0; i < grid.nx - 1; ++i)
-        different += stays(scene, masks, grid, i, j, k) != (hull->inside[voxel++] != 0);
-  EXPECT_GT(hull->count, 500u);
-  EXPECT_LT(hull->count, voxel / 4);
+  each_point(voxels_of(grid), [&](int i, int j, int k, std::size_t voxel) {
+    different += stays(scene, masks, grid, i, j, k) != (hull.inside[voxel] != 0);
+  });
+  EXPECT_GT(hull.count, 500u);
+  EXPECT_LT(hull.count, hull.inside.size() / 4);
   EXPECT_LE(different, 2u) << "float against double may differ where a corner meets a pixel's border";
 }
 
@@ -61,47 +58,41 @@ TEST_P(HullTest, HoldsTheTrueMediumThatIsBrightEnoughToBeSeen) {
   const Scene scene = small_flame_scene();
   const Grid grid = grid_over(scene.box, 48);
   const FlameTruth truth = Flame().at(Seconds(0), grid);
-  const auto hull = carve(scene, flame_masks(scene), grid, {});
-  ASSERT_TRUE(hull.ok());
+  const auto hull = value_of(carve(scene, flame_masks(scene), grid, {}));
   std::size_t lost = 0;
-  for (std::size_t v = 0; v < hull->inside.size(); ++v)
-    lost += truth.medium.inside[v] != 0 && hull->inside[v] == 0;
+  for (std::size_t v = 0; v < hull.inside.size(); ++v)
+    lost += truth.medium.inside[v] != 0 && hull.inside[v] == 0;
   EXPECT_LT(static_cast<double>(lost), 0.05 * static_cast<double>(truth.medium.count));
 }
 
 TEST_P(HullTest, ThresholdAboveEverythingIsAnErrorThatNamesViewAndThreshold) {
   const Scene scene = small_flame_scene();
-  const auto hull = carve(scene, flame_masks(scene, 1000), grid_over(scene.box, 32), {});
-  ASSERT_FALSE(hull.ok());
-  EXPECT_EQ(hull.error().where, "camera 0");
-  EXPECT_NE(hull.error().what.find("1e+03"), std::string::npos) << hull.error().message();
+  const Error hull = carve(scene, flame_masks(scene, 1000), grid_over(scene.box, 32), {}).error();
+  EXPECT_EQ(hull.where, "camera 0");
+  EXPECT_NE(hull.what.find("1e+03"), std::string::npos) << hull.message();
 }
 
 TEST_P(HullTest, ABlackViewIsNamed) {
   Scene scene = small_flame_scene();
   scene.views[3].image = share(RadianceImage({160, 120}));
-  const auto hull = carve(scene, flame_masks(scene), grid_over(scene.box, 32), {});
-  ASSERT_FALSE(hull.ok());
-  EXPECT_EQ(hull.error().where, "camera 3");
+  EXPECT_EQ(carve(scene, flame_masks(scene), grid_over(scene.box, 32), {}).error().where, "camera 3");
 }
 
 TEST_P(HullTest, HeldOutViewsDoNotCarve) {
   Scene scene = small_flame_scene();
   const Grid grid = grid_over(scene.box, 32);
-  const auto before = carve(scene, flame_masks(scene), grid, {});
+  const auto before = value_of(carve(scene, flame_masks(scene), grid, {}));
   scene.views[10].image = share(RadianceImage({160, 120}));
-  const auto after = carve(scene, flame_masks(scene), grid, {});
-  ASSERT_TRUE(before.ok() && after.ok());
-  EXPECT_EQ(before->inside, after->inside);
+  const auto after = value_of(carve(scene, flame_masks(scene), grid, {}));
+  EXPECT_EQ(before.inside, after.inside);
 }
 
 TEST_P(HullTest, AVoxelThatAViewCannotSeeIsNotCarvedByIt) {
   Scene scene = small_flame_scene();
   scene.views.resize(1);
   scene.views[0].camera.intrinsics.cx += 100000;  // the box is far out of the frame
-  const auto hull = carve(scene, flame_masks(scene), grid_over(scene.box, 8), {});
-  ASSERT_TRUE(hull.ok());
-  EXPECT_EQ(hull->count, hull->inside.size());
+  const auto hull = value_of(carve(scene, flame_masks(scene), grid_over(scene.box, 8), {}));
+  EXPECT_EQ(hull.count, hull.inside.size());
 }
 
 TEST_P(HullTest, SixtyFiveViewsAreRefused) {

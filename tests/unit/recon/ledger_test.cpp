@@ -17,6 +17,7 @@
 
 #include "base/file.h"
 #include "tests/support/recording.h"
+#include "tests/support/results.h"
 
 namespace emberlock::recon {
 namespace {
@@ -103,11 +104,10 @@ class Simulation {
     ranks_.push_back({Ledger(folder_, chunks_, name)});
   }
   void take(SimulatedRank& r) {
-    const auto claim = r.ledger.take([&](const std::string& worker) {
+    const auto claim = value_of(r.ledger.take([&](const std::string& worker) {
       return ranks_[static_cast<std::size_t>(std::stoi(worker.substr(5)))].life;
-    });
-    ASSERT_TRUE(claim.ok()) << claim.error().message();
-    r.claim = *claim;
+    }));
+    r.claim = claim;
   }
   /// One that was taken for dead may have lost its folder.
   void write_next_frame(SimulatedRank& r) {
@@ -117,9 +117,8 @@ class Simulation {
       std::ofstream(r.claim->work / std::to_string(frame)) << content(r.claim->chunk, frame);
       if (fs::exists(r.claim->work)) return;
     }
-    const auto first = r.ledger.finish(*r.claim);
-    ASSERT_TRUE(first.ok()) << first.error().message();
-    published_[r.claim->chunk] += *first ? 1 : 0;
+    const auto first = value_of(r.ledger.finish(*r.claim));
+    published_[r.claim->chunk] += first ? 1 : 0;
     r.claim.reset();
   }
   [[nodiscard]] std::size_t losses_of(const std::string& chunk) const {
@@ -167,11 +166,10 @@ TEST(LedgerTest, RanksThatAskAtOnceGetEachChunkOnce) {
       ASSERT_TRUE(Ledger::create(temp / "ledger", name, "by " + name, chunks).ok());
       Ledger ledger(temp / "ledger", chunks, name);
       for (;;) {
-        const auto claim = ledger.take(kAllLive);
-        ASSERT_TRUE(claim.ok()) << claim.error().message();
-        if (!*claim) break;
-        taken[r].push_back((*claim)->chunk);
-        ASSERT_TRUE(ledger.finish(**claim).ok());
+        const auto claim = value_of(ledger.take(kAllLive));
+        if (!claim) break;
+        taken[r].push_back(claim->chunk);
+        ASSERT_TRUE(ledger.finish(*claim).ok());
       }
     });
   for (std::thread& rank : ranks) rank.join();
@@ -190,23 +188,26 @@ class LedgerOfTwo : public testing::Test {
   static void write(const Ledger::Claim& claim, const char* name) {
     std::ofstream(claim.work / name) << content(claim.chunk, 0);
   }
+  /// The first worker's, of the first chunk, with a frame.
+  Ledger::Claim claim_with_frame() {
+    Ledger::Claim claim = value_of(first_.take(kAllLive)).value();
+    write(claim, "frame");
+    return claim;
+  }
   /// The first chunk is taken with the frame that an earlier attempt left.
   static void expect_gone_on_with(Ledger& ledger) {
-    const auto again = *ledger.take(kAllLive);
-    ASSERT_TRUE(again.has_value());
-    EXPECT_EQ(again->chunk, "a");
-    EXPECT_TRUE(fs::exists(again->work / "frame"));
+    const Ledger::Claim again = value_of(ledger.take(kAllLive)).value();
+    EXPECT_EQ(again.chunk, "a");
+    EXPECT_TRUE(fs::exists(again.work / "frame"));
+    EXPECT_TRUE(again.from.empty()) << "nobody died";
   }
   const TempFolder temp_;
   const fs::path folder_ = temp_ / "ledger";
   const std::vector<std::string> chunks_{"a", "b"};
   Ledger first_{folder_, chunks_, "first"}, second_{folder_, chunks_, "second"};
-  const Ledger::LifeOf first_is_gone_ = [](const std::string& w) {
-    return w == "first" ? Life::gone : Life::alive;
-  };
-  const Ledger::LifeOf first_is_silent_ = [](const std::string& w) {
-    return w == "first" ? Life::silent : Life::alive;
-  };
+  static Ledger::LifeOf first_is(Life life) {
+    return [life](const std::string& w) { return w == "first" ? life : Life::alive; };
+  }
 };
 
 TEST_F(LedgerOfTwo, KeepsThePlanOfWhoeverMadeIt) {
@@ -215,13 +216,8 @@ TEST_F(LedgerOfTwo, KeepsThePlanOfWhoeverMadeIt) {
 }
 
 TEST_F(LedgerOfTwo, WhatIsGivenBackIsGoneOnWith) {
-  const auto claim = *first_.take(kAllLive);
-  write(*claim, "frame");
-  ASSERT_TRUE(first_.give_back(*claim).ok());
-  const auto again = *second_.take(kAllLive);
-  EXPECT_EQ(again->chunk, "a");
-  EXPECT_TRUE(fs::exists(again->work / "frame"));
-  EXPECT_TRUE(again->from.empty()) << "nobody died";
+  ASSERT_TRUE(first_.give_back(claim_with_frame()).ok());
+  expect_gone_on_with(second_);
 }
 
 TEST_F(LedgerOfTwo, EachBeginsAtItsOwnPlace) {
@@ -238,18 +234,17 @@ TEST_F(LedgerOfTwo, EachBeginsAtItsOwnPlace) {
 }
 
 TEST_F(LedgerOfTwo, OfOneThatIsGoneEverythingIsKeptAndOfOneThatIsSilentNothing) {
-  const auto claim = *first_.take(kAllLive);
-  write(*claim, "frame");
+  const Ledger::Claim claim = claim_with_frame();
   ASSERT_EQ((*second_.take(kAllLive))->chunk, "b");
   EXPECT_FALSE((*second_.take(kAllLive)).has_value()) << "the first lives";
-  const auto silent = *second_.take(first_is_silent_);
+  const auto silent = *second_.take(first_is(Life::silent));
   ASSERT_TRUE(silent.has_value());
   EXPECT_EQ(silent->from, "first");
   EXPECT_FALSE(fs::exists(silent->work / "frame"));
   EXPECT_THAT(second_.losses(), testing::ElementsAre("a.first"));
   // It wakes, goes on, and is ahead of the other.
-  write(*claim, "rest");
-  EXPECT_TRUE(*first_.finish(*claim));
+  write(claim, "rest");
+  EXPECT_TRUE(*first_.finish(claim));
   EXPECT_FALSE(*second_.finish(*silent));
   EXPECT_TRUE(fs::exists(first_.result("a") / "frame"));
   EXPECT_TRUE(names_below(folder_ / "claims").size() == 1) << "of b";
@@ -258,8 +253,8 @@ TEST_F(LedgerOfTwo, OfOneThatIsGoneEverythingIsKeptAndOfOneThatIsSilentNothing) 
 TEST_F(LedgerOfTwo, OneThatDiesBetweenResultAndClaimHasDoneIt) {
   const auto claim = *first_.take(kAllLive);
   fs::rename(claim->work, first_.result("a"));
-  ASSERT_EQ((*second_.take(first_is_gone_))->chunk, "b");
-  EXPECT_FALSE((*second_.take(first_is_gone_)).has_value());
+  ASSERT_EQ((*second_.take(first_is(Life::gone)))->chunk, "b");
+  EXPECT_FALSE((*second_.take(first_is(Life::gone))).has_value());
   EXPECT_TRUE(second_.losses().empty());
   EXPECT_FALSE(fs::exists(folder_ / "claims" / "a.first"));
 }
@@ -282,18 +277,14 @@ TEST_F(LedgerOfTwo, AChunkThatKillsWhoeverDoesItIsGivenUpAndMayBeTriedAgain) {
 }
 
 TEST_F(LedgerOfTwo, AResultIsOpenedAgainWithWhatItHolds) {
-  const auto claim = *first_.take(kAllLive);
-  write(*claim, "frame");
-  ASSERT_TRUE(*first_.finish(*claim));
+  ASSERT_TRUE(*first_.finish(claim_with_frame()));
   ASSERT_TRUE(second_.reopen("a").ok());
   EXPECT_FALSE(first_.done("a"));
   expect_gone_on_with(first_);
 }
 
 TEST_F(LedgerOfTwo, TwoRunsThatOpenAResultAtOnceLoseNothingOfIt) {
-  const auto claim = *first_.take(kAllLive);
-  write(*claim, "frame");
-  ASSERT_TRUE(*first_.finish(*claim));
+  ASSERT_TRUE(*first_.finish(claim_with_frame()));
   ASSERT_TRUE(first_.reopen("a").ok());
   ASSERT_TRUE(second_.reopen("a").ok()) << "which found it done before the first opened it";
   EXPECT_TRUE(fs::is_empty(folder_ / "claims"));
@@ -301,11 +292,10 @@ TEST_F(LedgerOfTwo, TwoRunsThatOpenAResultAtOnceLoseNothingOfIt) {
 }
 
 TEST_F(LedgerOfTwo, OneThatIsDoneAfterAllIsNotGivenUp) {
-  const auto claim = *first_.take(kAllLive);
-  write(*claim, "frame");
+  const Ledger::Claim claim = claim_with_frame();
   fs::rename(folder_ / "claims" / "a.first", folder_ / "given_up" / "a");  // it was silent, as two before
   EXPECT_TRUE(second_.given_up("a"));
-  EXPECT_TRUE(*first_.finish(*claim));
+  EXPECT_TRUE(*first_.finish(claim));
   EXPECT_FALSE(second_.given_up("a"));
   ASSERT_TRUE(second_.reopen("a").ok());
   EXPECT_FALSE(second_.given_up("a"));
@@ -315,9 +305,7 @@ TEST_F(LedgerOfTwo, OneThatIsDoneAfterAllIsNotGivenUp) {
 TEST_F(LedgerOfTwo, AFolderThatCantBeWrittenToIsAnError) {
   fs::remove_all(folder_ / "work");
   std::ofstream(folder_ / "work") << "a file";
-  const auto claim = first_.take(kAllLive);
-  ASSERT_FALSE(claim.ok());
-  EXPECT_EQ(claim.error().kind, ErrorKind::io);
+  EXPECT_EQ(first_.take(kAllLive).error().kind, ErrorKind::io);
   EXPECT_TRUE(fs::exists(folder_ / "todo" / "a")) << "the chunk is nobody's";
 }
 

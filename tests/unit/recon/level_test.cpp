@@ -14,6 +14,7 @@
 #include "recon/adjust/engine.h"
 #include "recon/views/view.h"
 #include "tests/support/devices.h"
+#include "tests/support/key_points.h"
 #include "tests/support/march_case.h"
 
 namespace emberlock::recon {
@@ -67,16 +68,14 @@ TEST_P(LevelOn, TheShareOfAKeyPointIsThatOfItsVoxels) {
     const bool in = i >= 0 && j >= 0 && k >= 0 && i < g.nx - 1 && j < g.ny - 1 && k < g.nz - 1;
     return in && hull.inside[static_cast<std::size_t>(i + (g.nx - 1) * (j + (g.ny - 1) * k))] != 0;
   };
-  for (int k = 0; k < g.nz; ++k)
-    for (int j = 0; j < g.ny; ++j)
-      for (int i = 0; i < g.nx; ++i) {
-        int count = 0;
-        for (int c = 0; c < 8; ++c) count += inside(i - (c & 1), j - (c >> 1 & 1), k - (c >> 2)) ? 1 : 0;
-        ASSERT_EQ(posed.problem.share[g.index(i, j, k)], static_cast<float>(count) / 8);
-        found[g.index(i, j, k)] = -1;
-        ShareInside{g, hull.inside.data(), found.data()}(i, j, k);
-        ASSERT_EQ(found[g.index(i, j, k)], static_cast<float>(count) / 8) << "as a GPU's thread finds it";
-      }
+  each_point(g, [&](int i, int j, int k, std::size_t p) {
+    int count = 0;
+    for (int c = 0; c < 8; ++c) count += inside(i - (c & 1), j - (c >> 1 & 1), k - (c >> 2)) ? 1 : 0;
+    ASSERT_EQ(posed.problem.share[p], static_cast<float>(count) / 8);
+    found[p] = -1;
+    ShareInside{g, hull.inside.data(), found.data()}(i, j, k);
+    ASSERT_EQ(found[p], static_cast<float>(count) / 8) << "as a GPU's thread finds it";
+  });
 }
 
 TEST_P(LevelOn, AFinerLevelStartsFromTheLightBetweenTheCoarserOnesKeyPoints) {
@@ -92,35 +91,31 @@ TEST_P(LevelOn, AFinerLevelStartsFromTheLightBetweenTheCoarserOnesKeyPoints) {
   const Grid& f = from.problem.grid();
   const Grid& g = to.problem.grid();
   int lit = 0;
-  for (int k = 0; k < g.nz; ++k)
-    for (int j = 0; j < g.ny; ++j)
-      for (int i = 0; i < g.nx; ++i) {
-        const std::size_t p = g.index(i, j, k);
-        const int at[3] = {i, j, k};
-        const int points[3] = {f.nx, f.ny, f.nz};
-        int cell[3];
-        double part[3];
-        for (int a = 0; a < 3; ++a) {
-          const double place = 0.5 * (at[a] + to.problem.crop.offset[a]) - from.problem.crop.offset[a];
-          cell[a] = std::clamp(static_cast<int>(std::floor(place)), 0, points[a] - 2);
-          part[a] = place - cell[a];
-        }
-        for (std::size_t c = 0; c < 4; ++c) {
-          double value = 0;
-          for (int corner = 0; corner < 8; ++corner) {
-            double weight = 1;
-            for (int a = 0; a < 3; ++a) weight *= (corner >> a & 1) != 0 ? part[a] : 1 - part[a];
-            value +=
-                weight *
-                static_cast<double>(
-                    x[f.index(cell[0] + (corner & 1), cell[1] + (corner >> 1 & 1), cell[2] + (corner >> 2))]
-                        .c[c]);
-          }
-          const double expected = to.problem.share[p] > 0 ? 0.5 * value : 0;
-          ASSERT_NEAR(static_cast<double>(found[p].c[c]), expected, 1e-6);
-          lit += expected > 0 ? 1 : 0;
-        }
+  each_point(g, [&](int i, int j, int k, std::size_t p) {
+    const int at[3] = {i, j, k};
+    const int points[3] = {f.nx, f.ny, f.nz};
+    int cell[3];
+    double part[3];
+    for (int a = 0; a < 3; ++a) {
+      const double place = 0.5 * (at[a] + to.problem.crop.offset[a]) - from.problem.crop.offset[a];
+      cell[a] = std::clamp(static_cast<int>(std::floor(place)), 0, points[a] - 2);
+      part[a] = place - cell[a];
+    }
+    for (std::size_t c = 0; c < 4; ++c) {
+      double value = 0;
+      for (int corner = 0; corner < 8; ++corner) {
+        double weight = 1;
+        for (int a = 0; a < 3; ++a) weight *= (corner >> a & 1) != 0 ? part[a] : 1 - part[a];
+        value += weight *
+                 static_cast<double>(
+                     x[f.index(cell[0] + (corner & 1), cell[1] + (corner >> 1 & 1), cell[2] + (corner >> 2))]
+                         .c[c]);
       }
+      const double expected = to.problem.share[p] > 0 ? 0.5 * value : 0;
+      ASSERT_NEAR(static_cast<double>(found[p].c[c]), expected, 1e-6);
+      lit += expected > 0 ? 1 : 0;
+    }
+  });
   EXPECT_GT(lit, 1000);
 
   const auto same = to.engine();

@@ -6,6 +6,7 @@
 #include <gmock/gmock.h>
 
 #include "tests/support/glowing_flame.h"
+#include "tests/support/results.h"
 
 namespace emberlock::recon {
 namespace {
@@ -86,15 +87,12 @@ TEST(LineEmitters, C2LooksAsItsTransitionProbabilitiesSay) {
 TEST(LineEmitters, AreToldByName) {
   EXPECT_FALSE(parse_lines("")->any());
   EXPECT_TRUE(parse_lines("auto")->automatic);
-  const auto two = parse_lines("sodium,c2");
-  ASSERT_TRUE(two.ok());
-  EXPECT_EQ(two->named[1]->name, "c2");
+  const auto two = value_of(parse_lines("sodium,c2"));
+  EXPECT_EQ(two.named[1]->name, "c2");
   for (const char* bad : {"neon", "sodium,", ",", "sodium,auto", "sodium,sodium", "sodium,c2,ch"}) {
-    const auto refused = parse_lines(bad);
-    ASSERT_FALSE(refused.ok()) << bad;
-    EXPECT_THAT(refused.error().message(), HasSubstr("--lines")) << bad;
+    EXPECT_THAT(parse_lines(bad), FailsWith("--lines")) << bad;
   }
-  EXPECT_THAT(parse_lines("neon").error().message(), HasSubstr("lithium"));
+  EXPECT_THAT(parse_lines("neon"), FailsWith("lithium"));
 }
 
 TEST(LineEmitters, ThatACameraCantTellAreRefused) {

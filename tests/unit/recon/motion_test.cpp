@@ -9,23 +9,24 @@
 #include "recon/adjust/prepared_scene.h"
 #include "recon/adjust/solver.h"
 #include "recon/synthetic/flame.h"
+#include "tests/support/pictures.h"
+#include "tests/support/small_flame.h"
+#include "tests/support/solves.h"
 
 namespace emberlock::recon {
 namespace {
 
 constexpr double kReach = 5.4e-3;  // seconds
 
-PaperSceneOptions small_film() {
-  PaperSceneOptions options;
+PaperSceneOptions smaller_film() {
+  PaperSceneOptions options = small_film({128, 96}, 40);
   options.flame.seed = 3;
-  options.image = {128, 96};
-  options.truth_voxels = 40;
   return options;
 }
 
 /// Filmed by cameras up to 5.4 ms apart, whose averages are known.
 Scene late_scene(double rise_speed) {
-  PaperSceneOptions options = small_film();
+  PaperSceneOptions options = smaller_film();
   options.flame.rise_speed = rise_speed;
   options.averaged_frames = 8;
   for (std::uint64_t i = 0; i < 10; ++i)
@@ -39,16 +40,13 @@ const Scene& rising_scene() {
 }
 
 EffectChoice chosen(const Scene& scene, const EffectRequest& request = {}) {
-  const auto choice = choose_effects(scene, grid_over(scene.box, 40), request, {});
-  EXPECT_TRUE(choice.ok());
-  EXPECT_EQ(choice->reports.back().name, "motion");
-  return *choice;
+  const EffectChoice choice = value_of(choose_effects(scene, grid_over(scene.box, 40), request, {}));
+  EXPECT_EQ(choice.reports.back().name, "motion");
+  return choice;
 }
 
 double heldout(const Scene& scene, const Effects& effects) {
-  const auto solved = solve(scene, grid_over(scene.box, 40), effects, {});
-  EXPECT_TRUE(solved.ok());
-  return all_channels(solved->trace.back().heldout_rmse);
+  return held_out_error(solved_on(scene, 40, effects));
 }
 
 Motion rising(double speed) { return {Motion::Carry::uniform, {0, 0, speed}}; }
@@ -58,7 +56,7 @@ Motion rising(double speed) { return {Motion::Carry::uniform, {0, 0, speed}}; }
 Scene staggered_scene(double part) {
   constexpr int kCameras = 11;
   const Seconds period(1 / 24.0);
-  PaperSceneOptions options = small_film();
+  PaperSceneOptions options = smaller_film();
   options.flame.rise_speed = 1;
   options.cameras = kCameras;
   options.averaged_frames = 8;
@@ -119,16 +117,11 @@ TEST(MotionTestSlow, APictureOfThePlaneThroughTheFlameChangesPlaceAsTheCameraDoe
   view.lateness = Seconds(0.005);
   const Motion motion = rising(2);
   const auto picture = [&](const CameraModel& camera) {
-    RadianceImage image({64, 48});
-    for (int y = 0; y < 48; ++y)
-      for (int x = 0; x < 64; ++x) {
-        const Ray ray = camera.ray({x + 0.5, y + 0.5});
-        const Eigen::Vector3d point = ray.origin - ray.origin.y() / ray.direction.y() * ray.direction;
-        for (std::size_t c = 0; c < 3; ++c)
-          image.rgb[3 * static_cast<std::size_t>(64 * y + x) + c] =
-              static_cast<float>(100 * std::exp(-point.squaredNorm() / (2 * 0.03 * 0.03)));
-      }
-    return image;
+    return radiance_of({64, 48}, [&](int x, int y, int /*c*/) {
+      const Ray ray = camera.ray({x + 0.5, y + 0.5});
+      const Eigen::Vector3d point = ray.origin - ray.origin.y() / ray.direction.y() * ray.direction;
+      return 100 * std::exp(-point.squaredNorm() / (2 * 0.03 * 0.03));
+    });
   };
   const RadianceImage own = picture(view.camera);
   const RadianceImage moved = picture(camera_at_instant(view, motion));
@@ -153,7 +146,7 @@ TEST(MotionTestSlow, AFlameThatStandsStillAndOneFilmedAtOnceAreLeftAlone) {
   EXPECT_FALSE(standing.reports.back().on) << standing.reports.back().reason;
   EXPECT_EQ(standing.effects.motion.carry, Motion::Carry::none);
 
-  const Scene at_once = paper_scene(small_film());
+  const Scene at_once = paper_scene(smaller_film());
   const EffectChoice choice = chosen(at_once);
   EXPECT_FALSE(choice.reports.back().on);
   EXPECT_EQ(choice.reports.back().predicted_change, 0);
@@ -172,15 +165,14 @@ TEST(MotionTestSlow, TimesThatAreAsUncertainAsTheyDifferAreNotUsed) {
 }
 
 TEST(MotionTestSlow, WhatIsSetByHandIsTaken) {
-  const auto request = parse_effects("extinction=32.8,motion=0.8");
-  ASSERT_TRUE(request.ok());
-  EXPECT_EQ(request->fixed->motion.velocity, (std::array<double, 3>{0, 0, 0.8}));
+  const auto request = value_of(parse_effects("extinction=32.8,motion=0.8"));
+  EXPECT_EQ(request.fixed->motion.velocity, (std::array<double, 3>{0, 0, 0.8}));
   EXPECT_EQ(parse_effects("motion=0.1/-0.2/0.9")->fixed->motion.velocity,
             (std::array<double, 3>{0.1, -0.2, 0.9}));
   EXPECT_EQ(parse_effects("motion=none")->fixed->motion.carry, Motion::Carry::none);
   for (const char* wrong : {"motion=fast", "motion=1/2", "motion=21", "motion=0/0/nan"})
     EXPECT_FALSE(parse_effects(wrong).ok()) << wrong;
-  const EffectChoice choice = chosen(rising_scene(), *request);
+  const EffectChoice choice = chosen(rising_scene(), request);
   EXPECT_TRUE(choice.reports.back().on);
   EXPECT_GT(choice.reports.back().predicted_change, 1);
   EXPECT_EQ(choice.effects.motion.velocity[2], 0.8);
@@ -192,11 +184,10 @@ TEST(MotionTestSlow, TheSteadyPartGoesBackIntoARenderOfALateView) {
   const Scene& scene = rising_scene();
   Effects effects;
   effects.motion = rising(1);
-  const auto prepared = PreparedScene::create(scene, effects);
-  ASSERT_TRUE(prepared.ok());
-  const RadianceImage& at_instant = *prepared->scene().views[0].image;
+  const auto prepared = value_of(PreparedScene::create(scene, effects));
+  const RadianceImage& at_instant = *prepared.scene().views[0].image;
   RadianceImage render = at_instant;
-  prepared->at_own_instant(render, 0);
+  prepared.at_own_instant(render, 0);
   double worst = 0;
   for (std::size_t i = 0; i < render.rgb.size(); ++i)
     if (at_instant.rgb[i] > 0)  // elsewhere black has clipped it

@@ -12,6 +12,7 @@
 #include "tests/support/devices.h"
 #include "tests/support/edit_view.h"
 #include "tests/support/small_flame.h"
+#include "tests/support/solves.h"
 
 namespace emberlock::recon {
 namespace {
@@ -24,13 +25,7 @@ using testing::IsEmpty;
 
 const Effects kPapersMedium = absorbing(PerMeter(32.8));
 
-SolveOptions papers_options(int iterations = 1) {
-  SolveOptions options;
-  options.solver = Solver::paper;
-  options.iterations = iterations;
-  options.compute.device = device_here();
-  return options;
-}
+SolveOptions papers_options(int iterations = 1) { return solve_options(iterations, Solver::paper); }
 
 Result<Reconstruction> solved_under(const std::function<void(Effects&, Scene&)>& change) {
   Scene scene = small_flame_scene();
@@ -89,23 +84,18 @@ TEST_P(PapersSolver, KeepsWhatPassesAroundItHandle) {
 /// Light behind the flame is no flame, and pixels without flame aren't black but show it.
 TEST_P(PapersSolver, FindsTheFlameBeforeABackground) {
   Scene black = small_flame_scene();
-  const auto plain = solve(black, grid_over(black.box, 32), Effects{}, papers_options(20));
-  ASSERT_TRUE(plain.ok());
-  for (const float level : {20.F, 60.F}) {
+  const Reconstruction plain = solved_on(black, 32, {}, papers_options(20));
+  for (const double level : {20., 60.}) {
     Scene lit = black;
     for (View& view : lit.views)
       edit(view.image, [&](RadianceImage& image) {
-        for (float& value : image.rgb) value += level;
+        for (float& value : image.rgb) value += static_cast<float>(level);
       });
     Effects effects;
-    effects.background = {
-        Background::Kind::constant,
-        {static_cast<double>(level), static_cast<double>(level), static_cast<double>(level)}};
-    const auto r = solve(lit, grid_over(lit.box, 32), effects, papers_options(20));
-    ASSERT_TRUE(r.ok());
-    EXPECT_NEAR(all_channels(r->trace.back().input_rmse), all_channels(plain->trace.back().input_rmse), 0.05)
-        << level;
-    EXPECT_NEAR(all_channels(*r->heldout_rmse), all_channels(*plain->heldout_rmse), 0.05) << level;
+    effects.background = {Background::Kind::constant, {level, level, level}};
+    const Reconstruction r = solved_on(lit, 32, effects, papers_options(20));
+    EXPECT_NEAR(input_error(r), input_error(plain), 0.05) << level;
+    EXPECT_NEAR(all_channels(*r.heldout_rmse), all_channels(*plain.heldout_rmse), 0.05) << level;
   }
 }
 
@@ -114,17 +104,15 @@ TEST_P(PapersSolverSlow, ARunListsWhereItIsNotThePapers) {
   options.voxels = 12;
   options.solve = papers_options(2);
   const Scene scene = small_flame_scene();
-  const auto outcome = reconstruct(scene, options, test::CountingClock());
-  ASSERT_TRUE(outcome.ok()) << outcome.error().message();
-  const std::vector<std::string>& deviations = outcome->report.deviations;
+  const auto outcome = value_of(reconstruct(scene, options, test::CountingClock()));
+  const std::vector<std::string>& deviations = outcome.report.deviations;
   for (const char* words : {"starts at the hull", "length", "channels stop together", "voxel edges",
                             "sigma_G = 0.05", "1000 iterations"})
     EXPECT_THAT(deviations, Contains(HasSubstr(words)));
-  EXPECT_EQ(nlohmann::json::parse(to_json(outcome->report))["deviations"].size(), deviations.size());
+  EXPECT_EQ(nlohmann::json::parse(to_json(outcome.report))["deviations"].size(), deviations.size());
   options.solve.solver = Solver::standard;
-  const auto ours = reconstruct(scene, options, test::CountingClock());
-  ASSERT_TRUE(ours.ok()) << ours.error().message();
-  EXPECT_THAT(ours->report.deviations, IsEmpty());
+  const auto ours = value_of(reconstruct(scene, options, test::CountingClock()));
+  EXPECT_THAT(ours.report.deviations, IsEmpty());
 }
 
 }  // namespace

@@ -6,6 +6,8 @@
 
 #include <gtest/gtest.h>
 
+#include "tests/support/pictures.h"
+
 namespace emberlock::recon {
 namespace {
 
@@ -14,13 +16,8 @@ const PixelBox kWhole{0, 0, kSize.width, kSize.height};
 
 template <class Light>
 View view_of(const Light& light) {
-  RadianceImage image(kSize);
-  float* to = image.rgb.data();
-  for (int y = 0; y < kSize.height; ++y)
-    for (int x = 0; x < kSize.width; ++x)
-      for (int c = 0; c < 3; ++c) *to++ = static_cast<float>(light(x, y, c));
   View view;
-  view.image = share(std::move(image));
+  view.image = share(radiance_of(kSize, light));
   return view;
 }
 

@@ -8,6 +8,7 @@
 #include "recon/compute/cuda_device.h"
 #include "tests/support/devices.h"
 #include "tests/support/flame_frames.h"
+#include "tests/support/pictures.h"
 
 namespace emberlock::recon {
 namespace {
@@ -24,25 +25,17 @@ struct Filmed {
 
 /// A blob with a saturated core on a ramp, with noise and hot pixels.
 Image shot(PixelFormat format, bool flame, std::uint64_t seed) {
-  const bool wide = bytes_per_sample(format) == 2;
-  Image image(ImageLayout{{67, 53}, format, wide ? 10 : 8});
-  const int white = image.layout().white();
-  const int across = 67 * channels(format);
-  for (int y = 0; y < 53; ++y)
-    for (int i = 0; i < across; ++i) {
-      const int x = i / channels(format);
-      const double off = (x - 30.0) * (x - 30.0) + (y - 24.0) * (y - 24.0);
-      const auto at = static_cast<std::uint64_t>(y * across + i);
-      double level = 0.03 + 0.0003 * x + 0.01 * random_normal(seed, 1, at);
-      if (flame) level += (1.4 - 0.2 * (i % 3)) * std::exp(-off / 60);
-      if ((x * 7 + y * 13) % 401 == 0) level += 0.4;
-      const int sample = static_cast<int>(std::clamp(level, 0.0, 1.0) * white);
-      if (wide)
-        image.row_as<std::uint16_t>(y)[i] = static_cast<std::uint16_t>(sample);
-      else
-        image.row_as<std::uint8_t>(y)[i] = static_cast<std::uint8_t>(sample);
-    }
-  return image;
+  const ImageLayout layout{{67, 53}, format, bytes_per_sample(format) == 2 ? 10 : 8};
+  const int n = channels(format);
+  return image_of(layout, [&](int x, int y, int c) {
+    const int i = n * x + c;
+    const double off = (x - 30.0) * (x - 30.0) + (y - 24.0) * (y - 24.0);
+    double level =
+        0.03 + 0.0003 * x + 0.01 * random_normal(seed, 1, static_cast<std::uint64_t>(y * 67 * n + i));
+    if (flame) level += (1.4 - 0.2 * (i % 3)) * std::exp(-off / 60);
+    if ((x * 7 + y * 13) % 401 == 0) level += 0.4;
+    return std::clamp(level, 0.0, 1.0) * layout.white();
+  });
 }
 
 Colour uneven() {

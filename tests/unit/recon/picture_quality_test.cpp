@@ -3,21 +3,18 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdint>
 #include <functional>
 #include <random>
 
 #include <gtest/gtest.h>
 
+#include "tests/support/pictures.h"
+
 namespace emberlock::recon {
 namespace {
 
-Image picture(const std::function<int(int x, int y, int c)>& value, ImageSize size = {40, 30}) {
-  Image image(ImageLayout{size, PixelFormat::rgb8, 8});
-  for (int y = 0; y < size.height; ++y)
-    for (int i = 0; i < 3 * size.width; ++i)
-      image.row_as<std::uint8_t>(y)[i] = static_cast<std::uint8_t>(value(i / 3, y, i % 3));
-  return image;
+Image picture(const std::function<int(int x, int y, int c)>& value) {
+  return image_of({{40, 30}, PixelFormat::rgb8, 8}, value);
 }
 Image even(int level) {
   return picture([&](int, int, int) { return level; });

@@ -2,7 +2,6 @@
 #include "recon/pipeline/planned_run.h"
 
 #include <algorithm>
-#include <cmath>
 
 #include <gmock/gmock.h>
 #include <nlohmann/json.hpp>
@@ -10,7 +9,9 @@
 #include "recon/adjust/picture_error.h"
 #include "recon/pipeline/advice.h"
 #include "recon/pipeline/grid_choice.h"
+#include "tests/support/counting_clock.h"
 #include "tests/support/devices.h"
+#include "tests/support/results.h"
 #include "tests/support/small_flame.h"
 
 namespace emberlock::recon {
@@ -26,18 +27,7 @@ ON_EACH_DEVICE(Budget);
 using testing::Contains;
 using testing::HasSubstr;
 
-/// A tenth of a millisecond passes at every look, and whatever a test says in between.
-class SimulatedClock final : public Clock {
- public:
-  [[nodiscard]] TimePoint now() const override { return time_ = time_ + kTick; }
-  void sleep_until(TimePoint) override {}
-  void pass(Seconds time) { time_ = time_ + time; }
-
-  static constexpr Seconds kTick{1e-4};
-
- private:
-  mutable TimePoint time_;
-};
+constexpr Seconds kTick{1e-4};  // passes at every look at the clock
 
 const Scene& flame() {
   static const Scene scene = small_flame_scene();
@@ -54,7 +44,7 @@ ReconstructOptions with_budget(double seconds) {
 
 /// Each iteration at full resolution takes so long.
 Outcome run(const ReconstructOptions& options, Seconds iteration = Seconds(0)) {
-  SimulatedClock clock;
+  test::CountingClock clock(kTick);
   auto outcome = reconstruct(flame(), options, clock, {}, [&](const Preview&) { clock.pass(iteration); });
   if (!outcome) ADD_FAILURE() << outcome.error().message();
   return outcome ? std::move(*outcome) : Outcome{};
@@ -69,8 +59,7 @@ TEST_P(Budget, IsKeptToAnIterationWhateverTheMachine) {
       const Outcome outcome = run(options, Seconds(iteration));
       EXPECT_LT(outcome.report.iterations, 200);
       // A few looks at the clock belong to an iteration, too.
-      EXPECT_LE(outcome.report.total_time.value(),
-                1.05 * budget + iteration + 10 * SimulatedClock::kTick.value())
+      EXPECT_LE(outcome.report.total_time.value(), 1.05 * budget + iteration + 10 * kTick.value())
           << budget << " s, " << iteration << " s an iteration";
       ASSERT_TRUE(outcome.report.plan);
       EXPECT_NEAR(outcome.report.plan->over_budget.value(),
@@ -130,9 +119,8 @@ TEST_P(Budget, WhatTheUserSetStays) {
 TEST_P(Budget, WithoutAHeldOutViewPromisesNoError) {
   Scene scene = flame();
   scene.views.resize(10);
-  const auto outcome = reconstruct(scene, with_budget(0.01), SimulatedClock());
-  ASSERT_TRUE(outcome.ok()) << outcome.error().message();
-  EXPECT_FALSE(outcome->report.plan->predicted_rmse);
+  const auto outcome = value_of(reconstruct(scene, with_budget(0.01), test::CountingClock(kTick)));
+  EXPECT_FALSE(outcome.report.plan->predicted_rmse);
 }
 
 ReconstructOptions with_target(double rmse) {
@@ -190,7 +178,7 @@ TEST_P(Target, ToldToStopItTriesNoFurther) {
 TEST_P(Target, NeedsAHeldOutView) {
   Scene scene = flame();
   scene.views.resize(10);
-  EXPECT_FALSE(reconstruct(scene, with_target(5), SimulatedClock()).ok());
+  EXPECT_FALSE(reconstruct(scene, with_target(5), test::CountingClock(kTick)).ok());
 }
 
 TEST_P(Plan, StandsInTheReport) {

@@ -9,6 +9,7 @@
 #include "tests/support/devices.h"
 #include "tests/support/march_case.h"
 #include "tests/support/small_flame.h"
+#include "tests/support/solves.h"
 
 namespace emberlock::recon {
 namespace {
@@ -25,13 +26,6 @@ double relative_difference(const std::vector<Rgba>& a, const Marches<double>::Va
       largest = std::max(largest, std::abs(b[i].c[c]));
     }
   return difference / largest;
-}
-
-Marches<double>::Values widened(const std::vector<Rgba>& from) {
-  Marches<double>::Values to(from.size());
-  for (std::size_t i = 0; i < from.size(); ++i)
-    for (int c = 0; c < 4; ++c) to[i].c[c] = static_cast<double>(from[i].c[c]);
-  return to;
 }
 
 TEST(PrecisionSlow, PhiAndItsSlopeHoldTheirDigitsAtEveryDepth) {
@@ -73,12 +67,12 @@ TEST_P(PrecisionTestSlow, MarchesDifferByAHundredThousandthOfTheBrightest) {
       const Absorb known = sigma > 0 ? Absorb::constant : Absorb::nothing;
       for (const Absorb absorb : {known, Absorb::field})
         EXPECT_LT(relative_difference(narrow->forward(absorb, x, static_cast<float>(sigma)),
-                                      wide->forward(absorb, widened(x), sigma), 3),
+                                      wide->forward(absorb, converted<double>(x), sigma), 3),
                   1e-5)
             << sigma;
       const auto y = random_quads<float>(c.list.rays.size(), 2);
       EXPECT_LT(relative_difference(narrow->adjoint(known, y, static_cast<float>(sigma)),
-                                    wide->adjoint(known, widened(y), sigma), 3),
+                                    wide->adjoint(known, converted<double>(y), sigma), 3),
                 1e-5)
           << sigma;
     }
@@ -90,7 +84,7 @@ TEST_P(PrecisionTestSlow, TransmittanceIsRightToMillionthsHoweverThickTheMedium)
   for (double sigma = 1e-6; sigma < 1e9; sigma *= 10) {
     const auto x = random_quads<float>(c.list.grid.size(), 1, 1, 2 * sigma);
     const auto narrow = marches_on<float>(device_here(), c.list)->forward(Absorb::field, x);
-    const auto wide = marches_on<double>(device_here(), c.list)->forward(Absorb::field, widened(x));
+    const auto wide = marches_on<double>(device_here(), c.list)->forward(Absorb::field, converted<double>(x));
     for (std::size_t r = 0; r < wide.size(); ++r)
       EXPECT_NEAR(static_cast<double>(narrow[r].c[3]), wide[r].c[3], 5e-6) << sigma;
   }
@@ -106,25 +100,21 @@ TEST_P(PrecisionTestSlow, GradientsByEmissionAndExtinctionDifferByAHundredThousa
     const auto wide = marches_on<double>(device_here(), c.list);
     const auto a =
         narrow->field_adjoint(narrow->field_forward(x, {seen.data(), background.data(), nullptr, 0}));
-    const auto b =
-        wide->field_adjoint(wide->field_forward(widened(x), {seen.data(), background.data(), nullptr, 0}));
+    const auto b = wide->field_adjoint(
+        wide->field_forward(converted<double>(x), {seen.data(), background.data(), nullptr, 0}));
     EXPECT_LT(relative_difference(a, b, 4), 1e-5) << sigma;
   }
 }
 
 TEST_P(PrecisionTestSlow, ReconstructionsDifferByLessThanAHundredthOfAGreyLevelOnTheHeldOutView) {
   const Scene scene = small_flame_scene();
-  SolveOptions options;
-  options.compute.device = device_here();
+  SolveOptions twice;
+  twice.precision = Precision::float64;
   for (const double sigma : {0.0, 32.8}) {
-    double error[2] = {};
-    for (const Precision precision : {Precision::float32, Precision::float64}) {
-      options.precision = precision;
-      const auto r = solve(scene, grid_over(scene.box, 32), absorbing(PerMeter(sigma)), options);
-      ASSERT_TRUE(r.ok());
-      error[precision == Precision::float64 ? 1 : 0] = all_channels(r->trace.back().heldout_rmse);
-    }
-    EXPECT_NEAR(error[0], error[1], 0.01) << sigma;
+    const Effects effects = absorbing(PerMeter(sigma));
+    EXPECT_NEAR(held_out_error(solved_on(scene, 32, effects)),
+                held_out_error(solved_on(scene, 32, effects, twice)), 0.01)
+        << sigma;
   }
 }
 

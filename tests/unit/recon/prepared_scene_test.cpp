@@ -10,6 +10,7 @@
 #include "tests/support/ball_scene.h"
 #include "tests/support/count_allocations.h"
 #include "tests/support/counting_clock.h"
+#include "tests/support/results.h"
 
 namespace emberlock::recon {
 namespace {
@@ -42,9 +43,8 @@ int pictures_made(const Scene& scene, const std::optional<EffectRequest>& effect
   options.solve.compute.device = Device::cpu;
   options.solve.compute.threads = 2;
   return allocations_of(scene.views[0].image->rgb.size() * sizeof(float), [&] {
-    const auto outcome = reconstruct(scene, options, test::CountingClock());
-    ASSERT_TRUE(outcome.ok()) << outcome.error().message();
-    if (warnings != nullptr) *warnings = outcome->report.warnings;
+    const auto outcome = value_of(reconstruct(scene, options, test::CountingClock()));
+    if (warnings != nullptr) *warnings = outcome.report.warnings;
   });
 }
 
@@ -75,47 +75,44 @@ TEST(PreparedSceneTestSlow, AGreyBackgroundBehindAGammaIsKnownInLinearLevels) {
     respond(picture, bent.sensor);
     view.image = share(std::move(picture));
   }
-  const auto filmed = PreparedScene::create(scene, {});
-  ASSERT_TRUE(filmed.ok());
+  const auto filmed = value_of(PreparedScene::create(scene, {}));
   EffectRequest request;
   request.assumed.sensor.gamma = bent.sensor.gamma;
-  const Background found = under_known_effects(*filmed, request).effects().background;
+  const Background found = under_known_effects(filmed, request).effects().background;
   EXPECT_EQ(found.kind, Background::Kind::constant);
   for (const double level : found.radiance) EXPECT_NEAR(level, 12, 0.5);
 }
 
 TEST(PreparedSceneTestSlow, MasksAreFoundOnceForTheSamePicturesAndBackground) {
-  const auto prepared = PreparedScene::create(scene_of_a_ball(), {});
-  ASSERT_TRUE(prepared.ok());
-  const SharedMasks masks = prepared->masks({}, {});
+  const auto prepared = value_of(PreparedScene::create(scene_of_a_ball(), {}));
+  const SharedMasks masks = prepared.masks({}, {});
   Effects other;
   other.extinction = constant_extinction(PerMeter(30));
-  EXPECT_EQ(prepared->under(other).masks({}, {}), masks);
+  EXPECT_EQ(prepared.under(other).masks({}, {}), masks);
   other.background = {Background::Kind::constant, {9, 9, 9}};
-  EXPECT_NE(prepared->under(other).masks({}, {}), masks);
-  EXPECT_NE(prepared->under(a_gamma()).masks({}, {}), masks);
-  const SharedMasks at_threshold = prepared->masks(50, {});
+  EXPECT_NE(prepared.under(other).masks({}, {}), masks);
+  EXPECT_NE(prepared.under(a_gamma()).masks({}, {}), masks);
+  const SharedMasks at_threshold = prepared.masks(50, {});
   EXPECT_EQ((*at_threshold)[0].threshold, 50);
-  EXPECT_EQ(prepared->masks({}, {}), masks);
+  EXPECT_EQ(prepared.masks({}, {}), masks);
 }
 
 TEST(PreparedSceneTestSlow, WhatDoesNotChangeAPictureSharesIt) {
   const Scene told = scene_of_a_ball();
-  const auto prepared = PreparedScene::create(told, a_gamma());
-  ASSERT_TRUE(prepared.ok());
-  const SharedImage linear = prepared->scene().views[1].image;
+  const auto prepared = value_of(PreparedScene::create(told, a_gamma()));
+  const SharedImage linear = prepared.scene().views[1].image;
   EXPECT_NE(linear, told.views[1].image);
-  EXPECT_EQ(prepared->told().views[1].image, told.views[1].image);
+  EXPECT_EQ(prepared.told().views[1].image, told.views[1].image);
 
   Effects thick = a_gamma();
   thick.extinction = constant_extinction(PerMeter(30));
-  EXPECT_EQ(prepared->under(thick).scene().views[1].image, linear);
-  EXPECT_EQ(prepared->under(Effects{}).scene().views[1].image, told.views[1].image);
+  EXPECT_EQ(prepared.under(thick).scene().views[1].image, linear);
+  EXPECT_EQ(prepared.under(Effects{}).scene().views[1].image, told.views[1].image);
 
   std::vector<CameraModel> cameras;
   for (const View& view : told.views) cameras.push_back(view.camera);
   cameras[1].intrinsics.cx += 5;
-  const PreparedScene turned = prepared->through(cameras);
+  const PreparedScene turned = prepared.through(cameras);
   EXPECT_EQ(turned.scene().views[1].image, linear);
   EXPECT_EQ(turned.scene().views[1].camera.intrinsics.cx, cameras[1].intrinsics.cx);
   EXPECT_EQ(turned.told().views[1].camera.intrinsics.cx, cameras[1].intrinsics.cx);
@@ -129,23 +126,20 @@ TEST(PreparedSceneTestSlow, OnlyLateViewsWhoseAverageIsKnownGetOtherPictures) {
   told.views[3].average.reset();
   Effects moved;
   moved.motion = rising_fast();
-  const auto prepared = PreparedScene::create(told, moved);
-  ASSERT_TRUE(prepared.ok());
-  const std::vector<View>& views = prepared->scene().views;
+  const auto prepared = value_of(PreparedScene::create(told, moved));
+  const std::vector<View>& views = prepared.scene().views;
   EXPECT_EQ(views[1].image, told.views[1].image);
   EXPECT_NE(views[2].image, told.views[2].image);
   EXPECT_EQ(views[3].image, told.views[3].image);
   EXPECT_NE(views[3].camera.camera_from_world.translation,
             told.views[3].camera.camera_from_world.translation);
-  EXPECT_EQ(prepared->under(moved).scene().views[2].image, views[2].image) << "done before";
+  EXPECT_EQ(prepared.under(moved).scene().views[2].image, views[2].image) << "done before";
 }
 
 TEST(PreparedSceneTestSlow, ASceneThatNobodyCanUseIsNotPrepared) {
   Scene scene = scene_of_a_ball();
   scene.views[4].image.reset();
-  const auto prepared = PreparedScene::create(scene, {});
-  ASSERT_FALSE(prepared.ok());
-  EXPECT_EQ(prepared.error().where, "camera 4");
+  EXPECT_EQ(PreparedScene::create(scene, {}).error().where, "camera 4");
 }
 
 }  // namespace

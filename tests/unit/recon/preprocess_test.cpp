@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <array>
-#include <set>
 
 #include <gmock/gmock.h>
 
@@ -8,6 +6,8 @@
 #include "recon/preprocess/develop.h"
 #include "session/media/frame_file.h"
 #include "tests/support/flame_frames.h"
+#include "tests/support/pictures.h"
+#include "tests/support/results.h"
 
 namespace emberlock::recon {
 namespace {
@@ -69,11 +69,10 @@ TEST(Colour, GoesThroughTheManifestAndIsCheckedThere) {
   colour.dark = {0.01, 0.02, 0.03};
   colour.vignetting = {-0.2, -0.1, 0};
   colour.hot_pixels = {3, 7};
-  const auto back = read_colour(to_message(colour), {10, 10}, "camera a");
-  ASSERT_TRUE(back.ok()) << back.error().message();
-  EXPECT_EQ(back->response, colour.response);
-  EXPECT_EQ(back->vignetting, colour.vignetting);
-  EXPECT_EQ(back->hot_pixels, colour.hot_pixels);
+  const auto back = value_of(read_colour(to_message(colour), {10, 10}, "camera a"));
+  EXPECT_EQ(back.response, colour.response);
+  EXPECT_EQ(back.vignetting, colour.vignetting);
+  EXPECT_EQ(back.hot_pixels, colour.hot_pixels);
   const auto message_where = [&](auto&& change) {
     v1::Colour message = to_message(colour);
     change(message);
@@ -95,13 +94,12 @@ TEST(Demosaicing, BilinearIsTheBetterOneOnFlamesAndGradientOnPicturesWithEdges) 
     const auto [bilinear, gradient] = test::demosaicing_errors(small_flame_picture(), noise);
     EXPECT_LT(bilinear, 1.02 * gradient) << noise;
   }
-  const auto picture = session::read_image("/usr/share/doc/opencv-doc/examples/data/fruits.jpg");
-  ASSERT_TRUE(picture.ok()) << picture.error().message();
+  const auto picture = value_of(session::read_image("/usr/share/doc/opencv-doc/examples/data/fruits.jpg"));
   test::FilmOptions film;
   film.format = PixelFormat::bayer_rggb8;
   film.level = 0;
   film.noise = 0;
-  const RadianceImage truth = to_radiance(picture->view());
+  const RadianceImage truth = to_radiance(picture.view());
   const Samples mosaic = samples_of(test::film(truth, film, 1).view());
   const double bilinear = all_channels(rmse(to_picture(mosaic), truth, {}));
   const double gradient = all_channels(rmse(to_picture(mosaic, nullptr, Demosaicing::gradient), truth, {}));
@@ -127,12 +125,9 @@ double convolved(const ImageView& mosaic, int x, int y, int channel) {
 TEST(Demosaicing, BilinearIsTheNormalisedConvolutionWithSaturatedSamplesAndWithout) {
   for (const ImageSize size : {ImageSize{1, 1}, ImageSize{2, 5}, ImageSize{3, 3}, ImageSize{16, 10}}) {
     for (const double most : {254.0, 270.0}) {
-      Image image(ImageLayout{size, PixelFormat::bayer_rggb8, 8});
       RandomStream random(static_cast<std::uint64_t>(size.width), static_cast<std::uint64_t>(most));
-      for (int y = 0; y < size.height; ++y)
-        for (int x = 0; x < size.width; ++x)
-          image.row_as<std::uint8_t>(y)[x] =
-              static_cast<std::uint8_t>(std::min(255.0, random.uniform(0, most)));
+      const Image image = image_of({size, PixelFormat::bayer_rggb8, 8},
+                                   [&](int, int, int) { return std::min(255.0, random.uniform(0, most)); });
       const RadianceImage picture = to_picture(samples_of(image.view()));
       for (int y = 0; y < size.height; ++y)
         for (int x = 0; x < size.width; ++x)
@@ -145,11 +140,9 @@ TEST(Demosaicing, BilinearIsTheNormalisedConvolutionWithSaturatedSamplesAndWitho
 }
 
 TEST(Demosaicing, GradientKeepsSamplesAndRestoresLinearRamps) {
-  Image image(ImageLayout{{12, 12}, PixelFormat::bayer_rggb8, 8});
   const auto ramp = [](int x, int y, int c) { return 10 + (c + 1) * 3 * x + (3 - c) * 2 * y; };
-  for (int y = 0; y < 12; ++y)
-    for (int x = 0; x < 12; ++x)
-      image.row_as<std::uint8_t>(y)[x] = static_cast<std::uint8_t>(ramp(x, y, mosaic_channel(x, y)));
+  const Image image = image_of({{12, 12}, PixelFormat::bayer_rggb8, 8},
+                               [&](int x, int y, int) { return ramp(x, y, mosaic_channel(x, y)); });
   const RadianceImage picture = to_picture(samples_of(image.view()), nullptr, Demosaicing::gradient);
   for (int y = 2; y < 10; ++y)
     for (int x = 2; x < 10; ++x)

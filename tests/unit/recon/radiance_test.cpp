@@ -5,6 +5,8 @@
 
 #include <gtest/gtest.h>
 
+#include "tests/support/pictures.h"
+
 namespace emberlock::recon {
 namespace {
 
@@ -35,12 +37,8 @@ TEST(Radiance, ColourKeepsItsChannels) {
 TEST(Radiance, AMosaicOfLinearRampsIsRestoredInsideAndKeepsItsSamples) {
   constexpr int kSide = 8;
   const auto ramp = [](int x, int y, int c) { return 10 + (c + 1) * 3 * x + (3 - c) * 4 * y; };
-  Image mosaic(ImageLayout{{kSide, kSide}, PixelFormat::bayer_rggb8, 8});
-  for (int y = 0; y < kSide; ++y) {
-    for (int x = 0; x < kSide; ++x) {
-      mosaic.row_as<std::uint8_t>(y)[x] = static_cast<std::uint8_t>(ramp(x, y, (x & 1) + (y & 1)));
-    }
-  }
+  const Image mosaic = image_of({{kSide, kSide}, PixelFormat::bayer_rggb8, 8},
+                                [&](int x, int y, int) { return ramp(x, y, (x & 1) + (y & 1)); });
   const RadianceImage radiance = to_radiance(mosaic.view());
   for (int y = 0; y < kSide; ++y) {
     for (int x = 0; x < kSide; ++x) {

@@ -5,6 +5,8 @@
 
 #include <gtest/gtest.h>
 
+#include "tests/support/key_points.h"
+
 namespace emberlock::recon {
 namespace {
 
@@ -12,27 +14,12 @@ constexpr double kSigma = 5.670374419e-8;
 constexpr double kPi = 3.14159265358979;
 
 HotVolume ball(double radius, double kelvin, double absorption, int voxels = 48) {
-  HotVolume v;
-  const double half = 1.1 * radius;
-  const auto edge = static_cast<float>(2 * half / voxels);
-  v.grid = {{static_cast<float>(-half), static_cast<float>(-half), static_cast<float>(-half)},
-            edge,
-            voxels + 1,
-            voxels + 1,
-            voxels + 1};
-  v.kelvin.assign(v.grid.size(), 0);
-  v.absorption.assign(v.grid.size(), 0);
-  for (int k = 0; k <= voxels; ++k)
-    for (int j = 0; j <= voxels; ++j)
-      for (int i = 0; i <= voxels; ++i) {
-        const double c = voxels / 2.0;
-        const double r = static_cast<double>(edge) *
-                         std::sqrt(std::pow(i - c, 2) + std::pow(j - c, 2) + std::pow(k - c, 2));
-        // The border's voxels hold the share that lies inside.
-        const double inside = std::clamp((radius - r) / static_cast<double>(edge) + 0.5, 0.0, 1.0);
-        v.absorption[v.grid.index(i, j, k)] = static_cast<float>(inside * absorption);
-        v.kelvin[v.grid.index(i, j, k)] = inside > 0 ? static_cast<float>(kelvin) : 0;
-      }
+  HotVolume v{cube_grid(2.2 * radius, voxels), {}, {}};
+  each_point(v.grid, [&](int i, int j, int k) {
+    const double inside = share_in_ball(v.grid, i, j, k, radius);
+    v.kelvin.push_back(inside > 0 ? static_cast<float>(kelvin) : 0);
+    v.absorption.push_back(static_cast<float>(inside * absorption));
+  });
   return v;
 }
 

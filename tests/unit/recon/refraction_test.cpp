@@ -12,7 +12,9 @@
 #include "base/random.h"
 #include "recon/hull/hull.h"
 #include "recon/render/render.h"
+#include "tests/support/brute_force.h"
 #include "tests/support/devices.h"
+#include "tests/support/key_points.h"
 
 namespace emberlock::recon {
 namespace {
@@ -28,11 +30,13 @@ struct Stretch {
   double length;
 };
 
-std::vector<Stretch> chain(const IndexField& field, const Vector3f& origin, const Vector3f& direction) {
+std::vector<Stretch> chain(const RefractiveIndex& index, const Vector3f& origin, const Vector3f& direction,
+                           const Grid& medium = {}) {
   std::vector<Stretch> out;
-  trace(field, origin.data(), direction.data(), [&](const float* o, const float* d, float length) {
-    out.push_back({Vector3f(o), Vector3f(d), static_cast<double>(length)});
-  });
+  trace(index.field(medium), origin.data(), direction.data(),
+        [&](const float* o, const float* d, float length) {
+          out.push_back({Vector3f(o), Vector3f(d), static_cast<double>(length)});
+        });
   return out;
 }
 
@@ -41,12 +45,10 @@ RefractiveIndex sampled(int cells, const std::function<double(const Vector3d&)>&
   Grid grid;
   grid.nx = grid.ny = grid.nz = cells + 1;
   for (float& o : grid.origin) o = -0.5F * static_cast<float>(cells);
-  std::vector<float> values(grid.size());
-  for (int k = 0; k <= cells; ++k)
-    for (int j = 0; j <= cells; ++j)
-      for (int i = 0; i <= cells; ++i)
-        values[grid.index(i, j, k)] =
-            static_cast<float>(excess(Vector3d(i, j, k) - Vector3d::Constant(0.5 * cells)));
+  std::vector<float> values;
+  each_point(grid, [&](int i, int j, int k) {
+    values.push_back(static_cast<float>(excess(place_of(grid, i, j, k))));
+  });
   return {grid, values};
 }
 
@@ -60,7 +62,7 @@ TEST(Refraction, EvenGasOfAnyIndexLeavesTheRayItsBits) {
     const RefractiveIndex index = sampled(32, [&](const Vector3d&) { return excess; });
     for (const Vector3f& to : {Vector3f(0, 0, 0), Vector3f(7, -3, 5), Vector3f(0, 90, 0)}) {
       const Vector3f direction = (to - origin).normalized();
-      const auto path = chain(index.field(Grid{}), origin, direction);
+      const auto path = chain(index, origin, direction);
       ASSERT_EQ(path.size(), 1u);
       EXPECT_EQ(path[0].origin, origin);
       EXPECT_EQ(path[0].direction, direction);
@@ -74,7 +76,7 @@ TEST(Refraction, BouguersInvariantHoldsInARadialField) {
   const auto excess = [](const Vector3d& r) { return 0.2 * std::exp(-r.squaredNorm() / 60); };
   const RefractiveIndex index = sampled(64, excess);
   for (const float off : {1.F, 4.F, 9.F}) {
-    const auto path = chain(index.field(Grid{}), {-50, off, 0.3F}, {1, 0, 0});
+    const auto path = chain(index, {-50, off, 0.3F}, {1, 0, 0});
     ASSERT_GT(path.size(), 8u);
     const double expected = std::hypot(static_cast<double>(off), 0.3);
     double turned = 0;
@@ -93,7 +95,7 @@ TEST(Refraction, BouguersInvariantHoldsInARadialField) {
 TEST(Refraction, LinearIndexBendsTheRayIntoACatenary) {
   const double g = 0.01;
   const RefractiveIndex index = sampled(64, [&](const Vector3d& r) { return g * r.x(); });
-  const auto path = chain(index.field(Grid{}), {0, -31.999F, 0}, {0, 1, 0});
+  const auto path = chain(index, {0, -31.999F, 0}, {0, 1, 0});
   ASSERT_GT(path.size(), 10u);
   for (const Stretch& s : path) {
     const double y = static_cast<double>(s.origin.y()) + 32;
@@ -113,7 +115,7 @@ TEST(Refraction, HotColumnTurnsRaysByAbelsIntegral) {
       return -h * std::exp(-(r.x() * r.x() + r.y() * r.y()) / (w * w));
     });
     for (const double b : {-6.0, 2.5, 5.0, 8.0}) {
-      const auto path = chain(index.field(Grid{}), {-100, static_cast<float>(b), 0.5F}, {1, 0, 0});
+      const auto path = chain(index, {-100, static_cast<float>(b), 0.5F}, {1, 0, 0});
       const double expected = 2 * h * b * std::sqrt(std::numbers::pi) / w * std::exp(-b * b / (w * w));
       const double largest = h * std::sqrt(2 * std::numbers::pi / std::numbers::e);
       EXPECT_NEAR(bend(path).y(), expected, 1.3 / (w * w) * largest) << w << ", " << b;
@@ -125,7 +127,7 @@ TEST(Refraction, HotColumnTurnsRaysByAbelsIntegral) {
 TEST(Refraction, StretchesJoinWithinTheirTolerance) {
   const RefractiveIndex index =
       sampled(64, [](const Vector3d& r) { return -0.01 * std::exp(-r.squaredNorm() / 100); });
-  const auto path = chain(index.field(Grid{}), {-50, 6, 3}, Vector3f(1, 0.05F, -0.1F).normalized());
+  const auto path = chain(index, {-50, 6, 3}, Vector3f(1, 0.05F, -0.1F).normalized());
   ASSERT_GT(path.size(), 4u);
   for (std::size_t i = 0; i + 1 < path.size(); ++i) {
     const Vector3f end = path[i].origin + static_cast<float>(path[i].length) * path[i].direction;
@@ -137,10 +139,10 @@ TEST(Refraction, StretchesJoinWithinTheirTolerance) {
 TEST(Refraction, RaysThatMissTheGasOrStartInsideIt) {
   const RefractiveIndex index =
       sampled(16, [](const Vector3d& r) { return 0.01 * std::exp(-r.squaredNorm() / 9); });
-  EXPECT_EQ(chain(index.field(Grid{}), {-50, 9, 0}, {1, 0, 0}).size(), 1u);  // along a face, outside
-  EXPECT_EQ(chain(index.field(Grid{}), {50, 2, 0}, {1, 0, 0}).size(), 1u);   // behind the camera
-  EXPECT_GT(chain(index.field(Grid{}), {-4, 2, 0}, {1, 0, 0}).size(), 1u);   // a camera in the gas
-  EXPECT_GE(chain(index.field(Grid{}), {0, -50, 8}, {0, 1, 0}).size(), 1u);  // along a face
+  EXPECT_EQ(chain(index, {-50, 9, 0}, {1, 0, 0}).size(), 1u);  // along a face, outside
+  EXPECT_EQ(chain(index, {50, 2, 0}, {1, 0, 0}).size(), 1u);   // behind the camera
+  EXPECT_GT(chain(index, {-4, 2, 0}, {1, 0, 0}).size(), 1u);   // a camera in the gas
+  EXPECT_GE(chain(index, {0, -50, 8}, {0, 1, 0}).size(), 1u);  // along a face
 }
 
 TEST(Refraction, CoarserGridsOfTheMediumSeeTheSameRay) {
@@ -149,8 +151,8 @@ TEST(Refraction, CoarserGridsOfTheMediumSeeTheSameRay) {
   Grid coarse;
   coarse.edge = 2;
   coarse.origin[0] = -3;
-  const auto fine = chain(index.field(Grid{}), {-50, 3, 2}, {1, 0, 0});
-  const auto same = chain(index.field(coarse), {-23.5F, 1.5F, 1}, {1, 0, 0});
+  const auto fine = chain(index, {-50, 3, 2}, {1, 0, 0});
+  const auto same = chain(index, {-23.5F, 1.5F, 1}, {1, 0, 0}, coarse);
   EXPECT_NEAR(bend(fine).y(), bend(same).y(), 1e-6);
   EXPECT_GT(std::abs(bend(fine).y()), 1e-3);
 }
@@ -161,8 +163,7 @@ TEST(Refraction, IndexOfAirByGladstoneAndDale) {
 }
 
 TEST(Refraction, AssumedGasIsHotInTheMediumAndAmbientAroundIt) {
-  const Grid grid = grid_over({Vector3d::Zero(), Vector3d::Constant(0.2)}, 64);
-  const Hull medium = whole_grid(grid);
+  const Hull medium = whole_grid(cube_grid(0.2, 64));
   const Refraction refraction{Refraction::Rays::curved, Kelvin(1500), Kelvin(300)};
   const GasTemperature gas = assume_temperature(medium, {}, refraction);
   const Grid& g = gas.grid;
@@ -179,7 +180,7 @@ TEST(Refraction, AssumedGasIsHotInTheMediumAndAmbientAroundIt) {
 }
 
 TEST(Refraction, DarkGasIsAssumedCooler) {
-  const Grid grid = grid_over({Vector3d::Zero(), Vector3d::Constant(0.2)}, 32);
+  const Grid grid = cube_grid(0.2, 32);
   const Hull medium = whole_grid(grid);
   std::vector<Rgba> emission(grid.size());
   for (std::size_t p = 0; p < emission.size(); ++p)
@@ -201,52 +202,24 @@ constexpr Kelvin kAmbient(293);
 double lens(const Vector3d& r) { return kLensRise * std::exp(-r.squaredNorm() / (kLensWidth * kLensWidth)); }
 
 GasTemperature lens_gas() {
-  GasTemperature gas{grid_over({Vector3d::Zero(), Vector3d::Constant(0.4)}, 80), {}};
-  const Grid& g = gas.grid;
-  for (int k = 0; k < g.nz; ++k)
-    for (int j = 0; j < g.ny; ++j)
-      for (int i = 0; i < g.nx; ++i) {
-        const Vector3d r = Vector3d(i, j, k) * static_cast<double>(g.edge) - Vector3d::Constant(0.2);
-        const double excess = index_excess(kAmbient) + lens(r) * (1 + index_excess(kAmbient));
-        gas.kelvin.push_back(static_cast<float>(index_excess(Kelvin(1)) / excess));
-      }
+  GasTemperature gas{cube_grid(0.4, 80), {}};
+  each_point(gas.grid, [&](int i, int j, int k) {
+    const double excess =
+        index_excess(kAmbient) + lens(place_of(gas.grid, i, j, k)) * (1 + index_excess(kAmbient));
+    gas.kelvin.push_back(static_cast<float>(index_excess(Kelvin(1)) / excess));
+  });
   return gas;
 }
 
 struct Setting {
-  Grid grid = grid_over({Vector3d::Zero(), Vector3d::Constant(0.2)}, 16);
+  Grid grid = cube_grid(0.2, 16);
   Volume volume{grid, std::vector<float>(3 * grid.size()), {}};
-  Hull medium = whole_grid(grid);
+  Hull medium = medium_with_holes(grid, 0.7, 8);
   CameraModel camera = look_at({{16, 12}, 18, 18, 8, 6, {}}, Vector3d(0.3, -0.12, 0.1), Vector3d::Zero());
 
   Setting() {
     for (std::size_t i = 0; i < volume.emission.size(); ++i)
       volume.emission[i] = static_cast<float>(1000 * random_uniform(3, 0, i));
-    for (std::size_t i = 0; i < medium.inside.size(); ++i)
-      medium.inside[i] = random_uniform(4, 0, i / 8) < 0.7 ? 1 : 0;
-    medium.count =
-        static_cast<std::size_t>(std::count(medium.inside.begin(), medium.inside.end(), std::uint8_t{1}));
-  }
-
-  /// Emission of one channel at a point; -1 outside the medium.
-  [[nodiscard]] double emission(const Vector3d& at, int channel) const {
-    int cell[3];
-    double f[3];
-    for (int a = 0; a < 3; ++a) {
-      const double p = (at[a] - static_cast<double>(grid.origin[a])) / static_cast<double>(grid.edge);
-      cell[a] = static_cast<int>(std::floor(p));
-      if (cell[a] < 0 || cell[a] > 15) return -1;
-      f[a] = p - cell[a];
-    }
-    const int voxel = cell[0] + 16 * (cell[1] + 16 * cell[2]);
-    if (medium.inside[static_cast<std::size_t>(voxel)] == 0) return -1;
-    double sum = 0;
-    for (int c = 0; c < 8; ++c) {
-      const double w = (c & 1 ? f[0] : 1 - f[0]) * (c & 2 ? f[1] : 1 - f[1]) * (c & 4 ? f[2] : 1 - f[2]);
-      const std::size_t p = grid.index(cell[0] + (c & 1), cell[1] + (c >> 1 & 1), cell[2] + (c >> 2));
-      sum += w * static_cast<double>(volume.emission[3 * p + static_cast<std::size_t>(channel)]);
-    }
-    return sum;
   }
 
   /// The model along the true curve: Nystrom's fourth order through the analytic lens in tiny steps.
@@ -264,7 +237,7 @@ struct Setting {
       const Vector3d k1 = force(r);
       const Vector3d k2 = force(r + step / 2 * p + step * step / 8 * k1);
       const Vector3d k4 = force(r + step * p + step * step / 2 * k2);
-      const double s = emission(r + step / 2 * p, channel);
+      const double s = emission_at(volume, medium, r + step / 2 * p, channel);
       r += step * p + step * step / 6 * (k1 + 2 * k2);
       p += step / 6 * (k1 + 4 * k2 + k4);
       if (s < 0) continue;

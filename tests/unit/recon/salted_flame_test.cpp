@@ -1,12 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 // A flame of soot, salted with sodium on one side, above a blue base.
 #include <algorithm>
-#include <cmath>
 
 #include <gmock/gmock.h>
 
 #include "recon/export/temperature_words.h"
 #include "tests/support/glowing_flame.h"
+#include "tests/support/results.h"
+#include "tests/support/small_flame.h"
 
 namespace emberlock::recon {
 namespace {
@@ -17,9 +18,8 @@ class SaltedFlameTest : public testing::Test {
  protected:
   static void SetUpTestSuite() {
     test::GlowingFlameOptions options;
+    options.film = small_film({240, 180});
     options.film.flame.seed = 11;
-    options.film.image = {240, 180};
-    options.film.truth_voxels = 64;
     options.emitter = Emitter::soot;
     options.sodium = 0.4;
     options.blue_base = 0.3;
@@ -27,12 +27,10 @@ class SaltedFlameTest : public testing::Test {
     scene_ = new Scene(flame_->film());
     Effects effects;
     effects.extinction = {Extinction::Model::field, PerMeter(0), options.film.flame.extinction};
-    auto done = solve(*scene_, grid_over(scene_->box, 48), effects, {});
-    ASSERT_TRUE(done.ok()) << done.error().message();
-    done_ = new Reconstruction(std::move(*done));
-    auto errors = errors_by_views(*scene_, *done_, {});
-    ASSERT_TRUE(errors.ok()) << errors.error().message();
-    errors_ = new VolumeErrors(std::move(*errors));
+    auto done = value_of(solve(*scene_, grid_over(scene_->box, 48), effects, {}));
+    done_ = new Reconstruction(std::move(done));
+    auto errors = value_of(errors_by_views(*scene_, *done_, {}));
+    errors_ = new VolumeErrors(std::move(errors));
   }
   static void TearDownTestSuite() {
     delete errors_;

@@ -20,7 +20,9 @@
 #include "recon/export/nanovdb_file.h"
 #include "recon/export/volume_file.h"
 #include "recon/export/vti_file.h"
+#include "tests/support/key_points.h"
 #include "tests/support/recording.h"
+#include "tests/support/results.h"
 
 #pragma GCC diagnostic push
 #pragma GCC diagnostic ignored "-Wconversion"
@@ -63,16 +65,11 @@ class SharedFiles : public testing::Test {
   const test::TempFolder folder_;
 };
 
-/// Calls act(i, j, k, p) at each key point.
-template <class Act>
-void each_point(const Grid& grid, const Act& act) {
-  for (int k = 0; k < grid.nz; ++k)
-    for (int j = 0; j < grid.ny; ++j)
-      for (int i = 0; i < grid.nx; ++i) act(i, j, k, grid.index(i, j, k));
-}
-
-double along(const Grid& grid, int axis, int index) {
-  return static_cast<double>(grid.origin[axis]) + index * static_cast<double>(grid.edge);
+/// Whether a place is that of a key point.
+template <class Place>
+void expect_at(const Place& place, const Grid& grid, int i, int j, int k) {
+  const Eigen::Vector3d expected = place_of(grid, i, j, k);
+  for (int a = 0; a < 3; ++a) EXPECT_NEAR(place[a], expected[a], 1e-15);
 }
 
 openvdb::GridBase::Ptr opened(const fs::path& path, const std::string& name) {
@@ -92,7 +89,7 @@ std::vector<float> values_in(const openvdb::GridBase::Ptr& from, const Grid& gri
   std::vector<float> values;
   const auto scalar = openvdb::gridPtrCast<openvdb::FloatGrid>(from);
   const auto vector = openvdb::gridPtrCast<openvdb::Vec3SGrid>(from);
-  each_point(grid, [&](int i, int j, int k, std::size_t) {
+  each_point(grid, [&](int i, int j, int k) {
     if (scalar) values.push_back(scalar->tree().getValue({i, j, k}));
     for (int c = 0; vector && c < 3; ++c) values.push_back(vector->tree().getValue({i, j, k})[c]);
   });
@@ -109,11 +106,8 @@ TEST_F(SharedFiles, OpenVdbReadsTheSameBitsAtTheirPlaces) {
     EXPECT_EQ(values_in(read, flame_.grid), grid.values);
     const bool scalar = read->isType<openvdb::FloatGrid>();
     EXPECT_EQ(read->getGridClass(), scalar ? openvdb::GRID_FOG_VOLUME : openvdb::GRID_UNKNOWN);
-    each_point(flame_.grid, [&](int i, int j, int k, std::size_t) {
-      const openvdb::Vec3d at = read->transform().indexToWorld(openvdb::Coord(i, j, k));
-      EXPECT_NEAR(at.x(), along(flame_.grid, 0, i), 1e-15);
-      EXPECT_NEAR(at.y(), along(flame_.grid, 1, j), 1e-15);
-      EXPECT_NEAR(at.z(), along(flame_.grid, 2, k), 1e-15);
+    each_point(flame_.grid, [&](int i, int j, int k) {
+      expect_at(read->transform().indexToWorld(openvdb::Coord(i, j, k)), flame_.grid, i, j, k);
     });
     EXPECT_EQ(word(*read, "unit"), grid.unit);
     EXPECT_EQ(word(*read, "meaning"), grid.meaning);
@@ -127,21 +121,18 @@ TEST_F(SharedFiles, OpenVdbReadsTheSameBitsAtTheirPlaces) {
 TEST_F(SharedFiles, AnExportIsAVolumeOfOursToo) {
   const fs::path path = folder_ / "flame.vdb";
   ASSERT_TRUE(write_vdb(flame_, path, VdbSamples::at_index).ok());
-  const auto volume = read_volume(path);
-  ASSERT_TRUE(volume.ok()) << volume.error().message();
-  EXPECT_EQ(volume->extinction, flame_.grids[0].values);
-  EXPECT_EQ(volume->emission, flame_.grids[1].values);
-  const auto shared = read_shared_volume(path);
-  ASSERT_TRUE(shared.ok()) << shared.error().message();
-  EXPECT_TRUE(same_place(shared->grid, flame_.grid));
-  ASSERT_EQ(shared->grids.size(), 3U);
-  EXPECT_EQ(shared->find("temperature")->values, flame_.grids[2].values);
-  EXPECT_EQ(shared->find("temperature")->unit, "K");
-  const auto lighting = read_lighting(path);
-  ASSERT_TRUE(lighting.ok()) << lighting.error().message();
-  EXPECT_EQ(lighting->light.source, Light::Source::distant);
-  EXPECT_EQ(lighting->light.place, flame_.provenance.lighting.light.place);
-  EXPECT_EQ(lighting->light.strength, flame_.provenance.lighting.light.strength);
+  const auto volume = value_of(read_volume(path));
+  EXPECT_EQ(volume.extinction, flame_.grids[0].values);
+  EXPECT_EQ(volume.emission, flame_.grids[1].values);
+  const auto shared = value_of(read_shared_volume(path));
+  EXPECT_TRUE(same_place(shared.grid, flame_.grid));
+  ASSERT_EQ(shared.grids.size(), 3U);
+  EXPECT_EQ(shared.find("temperature")->values, flame_.grids[2].values);
+  EXPECT_EQ(shared.find("temperature")->unit, "K");
+  const auto lighting = value_of(read_lighting(path));
+  EXPECT_EQ(lighting.light.source, Light::Source::distant);
+  EXPECT_EQ(lighting.light.place, flame_.provenance.lighting.light.place);
+  EXPECT_EQ(lighting.light.strength, flame_.provenance.lighting.light.strength);
   // Values that lie elsewhere than OpenVDB says are none.
   ASSERT_TRUE(write_vdb(flame_, path, VdbSamples::half_an_edge_later).ok());
   EXPECT_FALSE(read_volume(path).ok());
@@ -184,15 +175,13 @@ TEST_F(SharedFiles, LightThatAFileTellsInAnotherWayIsRefused) {
     other.removeMeta(key);
     if (value != nullptr) other.insertMeta(key, *value);
     write_with(other, path);
-    const auto read = read_lighting(path);
-    ASSERT_FALSE(read.ok()) << key;
-    EXPECT_THAT(read.error().message(), HasSubstr(key));
+    EXPECT_THAT(read_lighting(path), FailsWith(key)) << key;
   }
   openvdb::MetaMap lit;
   lit.insertMeta("emberlock_light", StringMetadata("even"));
   lit.insertMeta("emberlock_light_place", half);
   write_with(lit, path);
-  EXPECT_THAT(read_lighting(path).error().message(), HasSubstr("emberlock_light_place"));
+  EXPECT_THAT(read_lighting(path), FailsWith("emberlock_light_place"));
 }
 
 TEST_F(SharedFiles, BeforeBlender5AKeyPointIsHalfAnEdgeBehindItsIndex) {
@@ -201,10 +190,7 @@ TEST_F(SharedFiles, BeforeBlender5AKeyPointIsHalfAnEdgeBehindItsIndex) {
   for (const SharedGrid& grid : flame_.grids) {
     const openvdb::GridBase::Ptr read = opened(path, grid.name);
     ASSERT_TRUE(read) << grid.name;
-    const openvdb::Vec3d at = read->transform().indexToWorld(openvdb::Vec3d(1.5, 2.5, 0.5));
-    EXPECT_NEAR(at.x(), along(flame_.grid, 0, 1), 1e-15);
-    EXPECT_NEAR(at.y(), along(flame_.grid, 1, 2), 1e-15);
-    EXPECT_NEAR(at.z(), along(flame_.grid, 2, 0), 1e-15);
+    expect_at(read->transform().indexToWorld(openvdb::Vec3d(1.5, 2.5, 0.5)), flame_.grid, 1, 2, 0);
   }
   // Its share of the light a voxel is e^-3 / 35, e^-6 / 35, e^-9 / 35 and so on.
   const auto density = openvdb::gridPtrCast<openvdb::FloatGrid>(opened(path, "density"));
@@ -233,16 +219,13 @@ void expect_nano_grid(const nanovdb::GridHandle<>& handle, const SharedGrid& exp
   EXPECT_EQ(read->isFogVolume(), (std::is_same_v<Value, float>));
   const auto accessor = read->getAccessor();
   std::vector<float> values;
-  each_point(grid, [&](int i, int j, int k, std::size_t) {
+  each_point(grid, [&](int i, int j, int k) {
     const nanovdb::Coord at(i, j, k);
     const Value value = accessor.getValue(at);
     EXPECT_EQ(accessor.isActive(at), value != Value(0.0F));
     const float* first = reinterpret_cast<const float*>(&value);
     values.insert(values.end(), first, first + sizeof(Value) / sizeof(float));
-    const nanovdb::Vec3d place = read->indexToWorld(nanovdb::Vec3d(i, j, k));
-    EXPECT_NEAR(place[0], along(grid, 0, i), 1e-15);
-    EXPECT_NEAR(place[1], along(grid, 1, j), 1e-15);
-    EXPECT_NEAR(place[2], along(grid, 2, k), 1e-15);
+    expect_at(read->indexToWorld(nanovdb::Vec3d(i, j, k)), grid, i, j, k);
   });
   EXPECT_EQ(values, expected.values);
 }
@@ -358,7 +341,7 @@ TEST_F(SharedFiles, WhatCannotBeWrittenIsAnErrorThatNamesTheFile) {
       const Status status = write(flame_, path);
       ASSERT_FALSE(status.ok()) << path;
       EXPECT_EQ(status.error().kind, ErrorKind::io);
-      EXPECT_THAT(status.error().message(), HasSubstr(path));
+      EXPECT_THAT(status, FailsWith(path));
     }
   }
 }

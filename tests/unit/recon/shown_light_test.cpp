@@ -13,8 +13,10 @@
 #include "recon/render/lit_medium.h"
 #include "recon/render/render.h"
 #include "recon/render/scattered_source.h"
+#include "tests/support/key_points.h"
 #include "tests/support/lit_scene.h"
 #include "tests/support/recording.h"
+#include "tests/support/results.h"
 #include "tests/support/small_flame.h"
 
 namespace emberlock::recon {
@@ -22,7 +24,6 @@ namespace {
 
 using Order = Scattering::Order;
 using Source = Light::Source;
-using testing::HasSubstr;
 
 constexpr ImageSize kPictures{64, 48};
 constexpr double kBall = 0.05;  // radius, metres
@@ -33,20 +34,12 @@ ComputeOptions on_cpu() { return {.device = Device::cpu}; }
 
 /// A ball of even extinction, 1/m, and emission, levels a metre.
 Volume even_ball(double sigma, double source) {
-  constexpr int kPoints = 2 * kMiddle + 1;
-  Volume v;
-  v.grid = {{-0.06F, -0.06F, -0.06F}, static_cast<float>(kEdge), kPoints, kPoints, kPoints};
-  v.emission.resize(3 * v.grid.size());
-  v.extinction.resize(v.grid.size());
-  for (int k = 0; k < kPoints; ++k)
-    for (int j = 0; j < kPoints; ++j)
-      for (int i = 0; i < kPoints; ++i) {
-        const double r = kEdge * std::hypot(i - kMiddle, j - kMiddle, k - kMiddle);
-        const double inside = std::clamp((kBall - r) / kEdge + 0.5, 0.0, 1.0);
-        const std::size_t p = v.grid.index(i, j, k);
-        for (std::size_t c = 0; c < 3; ++c) v.emission[3 * p + c] = static_cast<float>(inside * source);
-        v.extinction[p] = static_cast<float>(inside * sigma);
-      }
+  Volume v{cube_grid(0.12, 2 * kMiddle), {}, {}};
+  each_point(v.grid, [&](int i, int j, int k) {
+    const double inside = share_in_ball(v.grid, i, j, k, kBall);
+    v.emission.insert(v.emission.end(), 3, static_cast<float>(inside * source));
+    v.extinction.push_back(static_cast<float>(inside * sigma));
+  });
   return v;
 }
 
@@ -136,9 +129,8 @@ RadianceImage shown_from_file(const Reconstruction& done, const CameraModel& cam
   EXPECT_TRUE(
       write_volume(done.volume, folder / "volume.vdb", {}, {done.effects.scattering, done.effects.light})
           .ok());
-  const auto shown = read_shown_volume(folder / "volume.vdb");
-  EXPECT_TRUE(shown.ok());
-  return LightViews(shown->volume, shown->lighting.scattering, on_cpu()).of({&camera})[0].light;
+  const auto shown = value_of(read_shown_volume(folder / "volume.vdb"));
+  return LightViews(shown.volume, shown.lighting.scattering, on_cpu()).of({&camera})[0].light;
 }
 
 /// But for the hull's border, beyond which key points on it still shine in a file, half an edge.
@@ -150,16 +142,15 @@ TEST(ShownLight, AnInputCameraSeesWhatTheReconstructionSays) {
   effects.light = test::distant_light({1, -0.5, 0.4});
   effects.extinction = {Extinction::Model::field, PerMeter(0), PerMeter(5)};
   const Scene scene = film_lit(smoke, lit_truth(smoke, effects.light));
-  const auto done = solved_roughly(scene, effects, 4);
-  ASSERT_TRUE(done.ok()) << done.error().message();
+  const auto done = value_of(solved_roughly(scene, effects, 4));
   const CameraModel& camera = scene.views[0].camera;
-  const RadianceImage said = render_view(done->volume, done->hull, done->effects, camera);
-  EXPECT_LT(difference(shown_from_file(*done, camera), said), kOfTheBorder);
+  const RadianceImage said = render_view(done.volume, done.hull, done.effects, camera);
+  EXPECT_LT(difference(shown_from_file(done, camera), said), kOfTheBorder);
   // The file's light and density make its emission again.
   Pool pool(1);
-  const std::vector<float> lit = lit_emission(done->volume, done->effects.light, pool);
+  const std::vector<float> lit = lit_emission(done.volume, done.effects.light, pool);
   for (std::size_t i = 0; i < lit.size(); ++i)
-    ASSERT_NEAR(lit[i], done->volume.emission[i], 1e-3 * (1 + std::abs(lit[i])));
+    ASSERT_NEAR(lit[i], done.volume.emission[i], 1e-3 * (1 + std::abs(lit[i])));
 }
 
 /// a - b
@@ -174,13 +165,12 @@ void expect_shown_as_said(const Scattering& scattering, bool field) {
   effects.scattering = scattering;
   effects.extinction = constant_extinction(PerMeter(30));
   if (field) effects.extinction.model = Extinction::Model::field;
-  const auto done = solved_roughly(scene, effects, 2);
-  ASSERT_TRUE(done.ok()) << done.error().message();
+  const auto done = value_of(solved_roughly(scene, effects, 2));
   const CameraModel& camera = scene.views[0].camera;
-  const RadianceImage shown = shown_from_file(*done, camera);
-  const RadianceImage said = render_view(done->volume, done->hull, done->effects, camera);
+  const RadianceImage shown = shown_from_file(done, camera);
+  const RadianceImage said = render_view(done.volume, done.hull, done.effects, camera);
   EXPECT_LT(difference(shown, said), 2 * kOfTheBorder);
-  Reconstruction untold = *done;
+  Reconstruction untold = done;
   untold.effects.scattering = {};
   const RadianceImage without = render_view(untold.volume, untold.hull, untold.effects, camera);
   EXPECT_LT(difference(part_of(shown, shown_from_file(untold, camera)), part_of(said, without)), 0.05);
@@ -193,20 +183,16 @@ TEST(ShownScattering, AnInputCameraSeesWhatTheReconstructionSays) {
 
 /// Where nothing is, nothing shines, however far the scattered light of the medium's box is continued.
 TEST(ShownScattering, OutsideOfTheMediumNothingEmits) {
-  const Grid grid = grid_over({Eigen::Vector3d::Zero(), Eigen::Vector3d::Constant(0.2)}, 24);
+  const Grid grid = cube_grid(0.2, 24);
   Volume volume{grid, std::vector<float>(3 * grid.size()), {}};
   Hull hull = whole_grid(grid);
   hull.count = 0;
-  std::size_t voxel = 0;
-  for (int k = 0; k < grid.nz - 1; ++k)
-    for (int j = 0; j < grid.ny - 1; ++j)
-      for (int i = 0; i < grid.nx - 1; ++i, ++voxel) {
-        hull.inside[voxel] = k > 8 && k < 12 ? 1 : 0;
-        hull.count += hull.inside[voxel];
-        if (hull.inside[voxel] != 0)
-          for (std::size_t c = 0; c < 3; ++c)
-            volume.emission[3 * grid.index(i, j, k) + c] = static_cast<float>(500 * (k - 8));
-      }
+  each_point(voxels_of(grid), [&](int i, int j, int k, std::size_t voxel) {
+    hull.inside[voxel] = k > 8 && k < 12 ? 1 : 0;
+    hull.count += hull.inside[voxel];
+    if (hull.inside[voxel] != 0)
+      std::fill_n(&volume.emission[3 * grid.index(i, j, k)], 3, static_cast<float>(500 * (k - 8)));
+  });
   Effects effects;
   effects.scattering = {Order::multiple, 0.8, 0};
   effects.extinction = constant_extinction(PerMeter(30));
@@ -227,14 +213,13 @@ TEST(ShownScattering, HidesNoMoreOfWhatLiesBehind) {
 
 TEST(ShownLight, WhatCannotBeRelitIsRefused) {
   ShownVolume shown{even_ball(20, 1000)};
-  EXPECT_THAT(relight(shown, {Source::even}).error().message(), HasSubstr("as lit from outside"));
+  EXPECT_THAT(relight(shown, {Source::even}), FailsWith("as lit from outside"));
   shown.lighting.light = {Source::even, {}, {}, {1, 1, 1}};
   EXPECT_FALSE(relight(shown, {Source::found}).ok());
-  EXPECT_THAT(relight(shown, {Source::nearby, {0.05, 0, 0}}).error().message(),
-              HasSubstr("inside of the box"));
+  EXPECT_THAT(relight(shown, {Source::nearby, {0.05, 0, 0}}), FailsWith("inside of the box"));
   ShownVolume empty = shown;
   empty.volume.extinction.clear();
-  EXPECT_THAT(relight(empty, {Source::even}).error().message(), HasSubstr("no extinction"));
+  EXPECT_THAT(relight(empty, {Source::even}), FailsWith("no extinction"));
   ASSERT_TRUE(relight(shown, {}).ok());
   EXPECT_EQ(through_the_middle(shown.volume, {}), 0) << "in the dark";
 }
@@ -259,9 +244,8 @@ TEST(LightingFile, TellsWhatIsScatteredAndNothingWhereNothingIs) {
                                    {{}, {Source::distant, {1, -2, 0.5}, {1, 2, 3}, {4, 5, 6}}},
                                    {{}, {Source::nearby, {0, 7, 0}, {1, 2, 3}, {}}}}) {
     ASSERT_TRUE(write_volume(volume, folder / "volume.vdb", {}, lighting).ok());
-    const auto read = read_lighting(folder / "volume.vdb");
-    ASSERT_TRUE(read.ok()) << read.error().message();
-    expect_same(*read, lighting);
+    const auto read = value_of(read_lighting(folder / "volume.vdb"));
+    expect_same(read, lighting);
   }
   ASSERT_TRUE(write_volume(volume, folder / "plain.vdb").ok());
   expect_same(*read_lighting(folder / "plain.vdb"), {});
@@ -286,9 +270,8 @@ TEST(LightingFile, ValuesOutOfTheirRangeAreRefused) {
                                    {{}, {Source::nearby, {1e300, 0, 0}, {1, 1, 1}, {}}},
                                    {{}, {Source::nearby, {1, 0, 0}, {kInfinite, 1, 1}, {}}}}) {
     ASSERT_TRUE(write_volume(volume, folder / "bad.vdb", {}, lighting).ok());
-    const auto read = read_shown_volume(folder / "bad.vdb");
-    ASSERT_FALSE(read.ok()) << words(lighting.scattering) << words(lighting.light);
-    EXPECT_THAT(read.error().message(), HasSubstr("bad.vdb"));
+    EXPECT_THAT(read_shown_volume(folder / "bad.vdb"), FailsWith("bad.vdb"))
+        << words(lighting.scattering) << words(lighting.light);
   }
 }
 

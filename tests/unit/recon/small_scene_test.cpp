@@ -4,6 +4,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "tests/support/pictures.h"
+
 namespace emberlock::recon {
 namespace {
 
@@ -15,9 +17,7 @@ Scene scene_of_one_view() {
   scene.box = {{0, 0, 0}, {1, 1, 1}};
   View view;
   view.camera.intrinsics.size = {4, 4};
-  RadianceImage image({4, 4});
-  for (float& v : image.rgb) v = 100;
-  view.image = share(std::move(image));
+  view.image = share(radiance_of({4, 4}, [](int, int, int) { return 100; }));
   scene.views.push_back(view);
   return scene;
 }

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Pictures made with an effect, reconstructed with it and without: an effect that the solver follows must
 // cost nothing in quality, and one that it ignores must.
-#include <algorithm>
 
 #include <gtest/gtest.h>
 
@@ -11,6 +10,9 @@
 #include "recon/synthetic/flame.h"
 #include "tests/support/devices.h"
 #include "tests/support/edit_view.h"
+#include "tests/support/pictures.h"
+#include "tests/support/small_flame.h"
+#include "tests/support/solves.h"
 
 namespace emberlock::recon {
 namespace {
@@ -21,9 +23,7 @@ constexpr PerMeter kExtinction{32.8};
 
 /// The paper's set-up, small, filmed under `effects`; extinction is the flame's.
 Scene filmed(Effects effects, const SharedImage& background = nullptr) {
-  PaperSceneOptions options;
-  options.image = {160, 120};
-  options.truth_voxels = 64;
+  PaperSceneOptions options = small_film();
   options.flame.extinction = kExtinction;
   Scene scene = paper_scene(options);
   const FlameTruth truth = Flame(options.flame).at(Seconds(0), grid_over(scene.box, options.truth_voxels));
@@ -39,11 +39,7 @@ Scene filmed(Effects effects, const SharedImage& background = nullptr) {
 
 double heldout(const Scene& scene, Effects effects) {
   effects.extinction = constant_extinction(kExtinction);
-  SolveOptions options;
-  options.compute.device = device_here();
-  const auto r = solve(scene, grid_over(scene.box, 48), effects, options);
-  EXPECT_TRUE(r.ok());
-  return r.ok() ? all_channels(r->trace.back().heldout_rmse) : 1e9;
+  return held_out_error(solved_on(scene, 48, effects));
 }
 
 double undisturbed() {
@@ -51,34 +47,31 @@ double undisturbed() {
   return error;
 }
 
+/// Following the effects costs little, ignoring them costs a factor.
+void expect_followed(const Scene& scene, const Effects& effects, double ignored) {
+  const double known = heldout(scene, effects);
+  EXPECT_LT(known, 1.25 * undisturbed());
+  EXPECT_GT(heldout(scene, {}), ignored * known);
+}
+
 TEST_P(SolveEffectsSlow, AnEvenBackgroundIsSeenThroughTheFlame) {
   Effects effects;
   effects.background = {Background::Kind::constant, {60, 50, 40}};
-  const Scene scene = filmed(effects);
-  const double known = heldout(scene, effects);
-  EXPECT_LT(known, 1.25 * undisturbed());
-  EXPECT_GT(heldout(scene, {}), 2 * known);
+  expect_followed(filmed(effects), effects, 2);
 }
 
 TEST_P(SolveEffectsSlow, APictureOfTheBackgroundIsSeenThroughTheFlame) {
-  RadianceImage wall({160, 120});
-  for (std::size_t i = 0; i < wall.rgb.size(); ++i) wall.rgb[i] = 20 + 0.4F * static_cast<float>(i / 3 % 160);
+  const RadianceImage wall = radiance_of({160, 120}, [](int x, int, int) { return 20 + 0.4 * x; });
   Effects effects;
   effects.background.kind = Background::Kind::image;
-  const Scene scene = filmed(effects, share(wall));
-  const double known = heldout(scene, effects);
-  EXPECT_LT(known, 1.25 * undisturbed());
-  EXPECT_GT(heldout(scene, {}), 2 * known);
+  expect_followed(filmed(effects, share(wall)), effects, 2);
 }
 
 TEST_P(SolveEffectsSlow, GammaCodedPicturesAreMadeLinear) {
   Effects effects;
   effects.sensor.response = Sensor::Response::gamma;
   effects.sensor.gamma = 2.2;
-  const Scene scene = filmed(effects);
-  const double known = heldout(scene, effects);
-  EXPECT_LT(known, 1.25 * undisturbed());
-  EXPECT_GT(heldout(scene, {}), 1.3 * known);
+  expect_followed(filmed(effects), effects, 1.3);
 }
 
 TEST_P(SolveEffectsSlow, SaturatedPixelsBoundTheLightFromBelow) {
@@ -86,8 +79,7 @@ TEST_P(SolveEffectsSlow, SaturatedPixelsBoundTheLightFromBelow) {
   effects.sensor.clipping = Sensor::Clipping::at_white;
   effects.sensor.white = 120;
   Scene scene = filmed(effects);
-  const Scene unclipped = filmed({});
-  scene.views.back().image = unclipped.views.back().image;  // judged by what really was there
+  scene.views.back().image = filmed({}).views.back().image;  // judged by what really was there
   const double as_bounds = heldout(scene, effects);
   EXPECT_LT(as_bounds, 0.8 * heldout(scene, {}));
 }
@@ -121,17 +113,13 @@ TEST_P(SolveEffectsSlow, ARisingFlameIsSharpenedAgain) {
   instant.views.back().image = filmed({}).views.back().image;
   // Judged on a picture taken in an instant: the volume itself, not its blur.
   const double blurred = heldout(instant, {});
-  SolveOptions options;
-  options.compute.device = device_here();
   effects.extinction = constant_extinction(kExtinction);
-  const auto r = solve(scene, grid_over(scene.box, 48), effects, options);
-  ASSERT_TRUE(r.ok());
+  const Reconstruction r = solved_on(scene, 48, effects);
   Effects at_once;
   at_once.extinction = effects.extinction;
   const View& unseen = instant.views.back();
-  const double sharp =
-      all_channels(rmse(*unseen.image, render_view(r->volume, r->hull, at_once, unseen.camera),
-                        flame_mask(*unseen.image, 1).box));
+  const double sharp = all_channels(rmse(*unseen.image, render_view(r.volume, r.hull, at_once, unseen.camera),
+                                         flame_mask(*unseen.image, 1).box));
   EXPECT_LT(sharp, 0.95 * blurred);
 }
 
@@ -148,23 +136,19 @@ TEST_P(SolveEffectsSlow, LightThatTheMediumScattersIsTakenOutOfTheEmission) {
   effects.scattering = {Scattering::Order::multiple, 0.6, 0};
   const Scene scene = filmed(effects);
   effects.extinction = {Extinction::Model::field, kExtinction, PerMeter(0)};
-  SolveOptions options;
-  options.compute.device = device_here();
-  const auto r = solve(scene, grid_over(scene.box, 48), effects, options);
-  ASSERT_TRUE(r.ok());
-  const double error = all_channels(r->trace.back().heldout_rmse);
+  const Reconstruction r = solved_on(scene, 48, effects);
+  const double error = held_out_error(r);
   EXPECT_LT(error, 1.2 * undisturbed());
   // The volume emits, scatters, and shows what was seen; with its scattering left out it is darker.
   const View& unseen = scene.views.back();
-  const PixelBox box = flame_mask(*unseen.image, 1).box;
-  const double again =
-      all_channels(rmse(*unseen.image, render_view(r->volume, r->hull, effects, unseen.camera), box));
+  const auto shown_under = [&](const Effects& shown) {
+    return all_channels(rmse(*unseen.image, render_view(r.volume, r.hull, shown, unseen.camera),
+                             flame_mask(*unseen.image, 1).box));
+  };
+  const double again = shown_under(effects);
   EXPECT_LT(again, 1.5 * error);  // the emission has no negative places where more is scattered than shines
-  Effects dark = effects;
-  dark.scattering = {};
-  const double without =
-      all_channels(rmse(*unseen.image, render_view(r->volume, r->hull, dark, unseen.camera), box));
-  EXPECT_GT(without, 2 * again);
+  effects.scattering = {};
+  EXPECT_GT(shown_under(effects), 2 * again);
 }
 
 TEST_P(SolveEffectsSlow, LightScatteredForwardsIsToldFromLightThatShinesEvenly) {
@@ -175,25 +159,17 @@ TEST_P(SolveEffectsSlow, LightScatteredForwardsIsToldFromLightThatShinesEvenly) 
     Effects assumed;
     assumed.extinction = {Extinction::Model::field, kExtinction, PerMeter(0)};
     assumed.scattering = {Scattering::Order::single, 0.8, asymmetry};
-    SolveOptions options;
-    options.iterations = 6;
-    options.compute.device = device_here();
-    const auto r = solve(scene, grid_over(scene.box, 32), assumed, options);
-    EXPECT_TRUE(r.ok());
-    return all_channels(r->trace.back().heldout_rmse);
+    return held_out_error(solved_on(scene, 32, assumed, solve_options(6)));
   };
   EXPECT_LT(error(0.8), error(0));
 }
 
 TEST_P(SolveEffectsSlow, ThePapersSolverRefusesWhatItDoesNotKnow) {
   const Scene scene = filmed({});
-  SolveOptions options;
-  options.solver = Solver::paper;
   Effects effects;
   effects.extinction.model = Extinction::Model::field;
-  const auto r = solve(scene, grid_over(scene.box, 16), effects, options);
-  ASSERT_FALSE(r.ok());
-  EXPECT_NE(r.error().what.find("paper"), std::string::npos);
+  EXPECT_THAT(solve(scene, grid_over(scene.box, 16), effects, solve_options(0, Solver::paper)),
+              FailsWith("paper"));
 }
 
 }  // namespace

@@ -8,6 +8,7 @@
 #include "recon/adjust/guard.h"
 #include "recon/adjust/picture_error.h"
 #include "tests/support/devices.h"
+#include "tests/support/solves.h"
 
 namespace emberlock::recon {
 namespace {
@@ -42,13 +43,9 @@ TEST_P(SolverSweepSlow, EvenRingsOfTheBallConvergeAtAnyResolution) {
       BallOptions ball;
       ball.height = height;
       ball.image = {320, 240};
-      const Scene scene = ball_scene(ball);
-      SolveOptions options;
-      options.compute.device = device_here();
-      const auto r = solve(scene, grid_over(scene.box, voxels), {}, options);
-      ASSERT_TRUE(r.ok()) << r.error().message();
-      EXPECT_LT(all_channels(r->trace.back().heldout_rmse), 0.7);
-      EXPECT_EQ(r->halvings, 0) << "the weights alone must keep it from diverging";
+      const Reconstruction r = solved_on(ball_scene(ball), voxels);
+      EXPECT_LT(held_out_error(r), 0.7);
+      EXPECT_EQ(r.halvings, 0) << "the weights alone must keep it from diverging";
     }
 }
 
@@ -59,17 +56,12 @@ TEST_P(SolverSweepSlow, ThePapersSolverWithManyViewsIsTakenBackInsteadOfGrowing)
   ball.height = 60;
   ball.image = {480, 360};
   const Scene scene = ball_scene(ball);
-  SolveOptions options;
-  options.compute.device = device_here();
-  options.solver = Solver::paper;
   for (const int iterations : {40, 0}) {  // 0: to its own end, which a step that was taken back is not
     SCOPED_TRACE(iterations);
-    options.iterations = iterations;
-    const auto r = solve(scene, grid_over(scene.box, 16), {}, options);
-    ASSERT_TRUE(r.ok()) << r.error().message();
-    EXPECT_GT(r->halvings, 0);
-    EXPECT_GT(r->iterations, 5);
-    EXPECT_LE(all_channels(r->trace.back().input_rmse), 0.5 * all_channels(r->trace.front().input_rmse));
+    const Reconstruction r = solved_on(scene, 16, {}, solve_options(iterations, Solver::paper));
+    EXPECT_GT(r.halvings, 0);
+    EXPECT_GT(r.iterations, 5);
+    EXPECT_LE(input_error(r), 0.5 * all_channels(r.trace.front().input_rmse));
   }
 }
 

@@ -2,65 +2,68 @@
 #include "recon/temperature/temperature.h"
 
 #include <cmath>
+#include <memory>
 
 #include <gmock/gmock.h>
 
 #include "recon/temperature/self_absorption.h"
 #include "tests/support/glowing_flame.h"
+#include "tests/support/key_points.h"
+#include "tests/support/small_flame.h"
+#include "tests/support/solves.h"
 
 namespace emberlock::recon {
 namespace {
 
-using testing::HasSubstr;
-
-test::GlowingFlameOptions small_flame(Emitter emitter, std::uint64_t seed = 11) {
+test::GlowingFlameOptions small_flame(Emitter emitter) {
   test::GlowingFlameOptions options;
-  options.film.flame.seed = seed;
-  options.film.image = {320, 240};
-  options.film.truth_voxels = 96;
+  options.film = small_film({320, 240}, 96);
+  options.film.flame.seed = 11;
   options.emitter = emitter;
   return options;
 }
 
+/// A flame's pictures, solved; and its temperatures as they are read from them.
 struct Solved {
+  explicit Solved(const test::GlowingFlameOptions& options, int voxels = 64)
+      : flame(std::make_shared<const test::GlowingFlame>(options)),
+        response(flame->response()),
+        scene(flame->film()) {
+    Effects effects;
+    effects.extinction = {Extinction::Model::field, PerMeter(0), options.film.flame.extinction};
+    done = solved_on(scene, voxels, effects);
+    errors = value_of(errors_by_views(scene, done, {}));
+  }
+  [[nodiscard]] TemperatureField read(std::optional<Emitter> emitter,
+                                      const SolveOptions& options = {}) const {
+    return temperature_of(scene, done, errors, response, emitter, options);
+  }
+  [[nodiscard]] TemperatureField read_by_voxel(Emitter emitter) const {
+    return temperature_of(scene, test::voxel_by_voxel(done), errors, response, emitter);
+  }
+  [[nodiscard]] test::TemperatureScore score(const TemperatureField& field) const {
+    return test::score_of(*flame, done, field);
+  }
+
+  std::shared_ptr<const test::GlowingFlame> flame;
+  CameraResponse response;
   Scene scene;
   Reconstruction done;
   VolumeErrors errors;
 };
 
-Solved solved(const test::GlowingFlame& flame, int voxels = 64) {
-  Solved out;
-  out.scene = flame.film();
-  const Grid grid = grid_over(out.scene.box, voxels);
-  Effects effects;
-  effects.extinction = {Extinction::Model::field, PerMeter(0), flame.options().film.flame.extinction};
-  auto done = solve(out.scene, grid, effects, {});
-  EXPECT_TRUE(done.ok()) << done.error().message();
-  out.done = std::move(*done);
-  auto errors = errors_by_views(out.scene, out.done, {});
-  EXPECT_TRUE(errors.ok()) << errors.error().message();
-  out.errors = std::move(*errors);
-  return out;
-}
-
 /// Solved once for all tests.
-const test::GlowingFlame& flame_of(Emitter emitter) {
-  static const test::GlowingFlame grey(small_flame(Emitter::grey));
-  static const test::GlowingFlame soot(small_flame(Emitter::soot));
-  return emitter == Emitter::grey ? grey : soot;
-}
 const Solved& solved_of(Emitter emitter) {
-  static const Solved grey = solved(flame_of(Emitter::grey));
-  static const Solved soot = solved(flame_of(Emitter::soot));
+  static const Solved grey(small_flame(Emitter::grey));
+  static const Solved soot(small_flame(Emitter::soot));
   return emitter == Emitter::grey ? grey : soot;
 }
 
 TEST(TemperatureSlow, IsReadToATwentiethOfItsRangeAndItsErrorsHold) {
   for (const Emitter emitter : {Emitter::grey, Emitter::soot}) {
-    const test::GlowingFlame& flame = flame_of(emitter);
     const Solved& s = solved_of(emitter);
-    const TemperatureField field = temperature_of(s.scene, s.done, s.errors, flame.response(), emitter);
-    const test::TemperatureScore score = test::score_of(flame, s.done, field);
+    const TemperatureField field = s.read(emitter);
+    const test::TemperatureScore score = s.score(field);
     SCOPED_TRACE(test::words(score, field));
     EXPECT_LT(score.median, 40) << "of 1450 to 2030 K, half the resolution of the bench";
     EXPECT_LT(score.most, 90);
@@ -105,18 +108,16 @@ TEST(TemperatureSlow, OfNoisyPicturesIsBetterSolvedTogetherThanReadVoxelByVoxel)
   test::GlowingFlameOptions noisy = small_flame(Emitter::grey);
   noisy.noise = 1;
   noisy.levels = 255;
-  const test::GlowingFlame flame(noisy);
-  const Solved s = solved(flame);
-  const TemperatureField alone =
-      temperature_of(s.scene, test::voxel_by_voxel(s.done), s.errors, flame.response(), Emitter::grey);
-  const TemperatureField field = temperature_of(s.scene, s.done, s.errors, flame.response(), Emitter::grey);
+  const Solved s(noisy);
+  const TemperatureField alone = s.read_by_voxel(Emitter::grey);
+  const TemperatureField field = s.read(Emitter::grey);
   EXPECT_EQ(alone.summary.joint.iterations, 0);
   const JointSolve& joint = field.summary.joint;
   EXPECT_LT(joint.left_out.value_or(2), kMostLeftOutMisfit);
   EXPECT_GT(joint.iterations, 0);
   EXPECT_LT(joint.after, 0.9 * joint.before);
-  const test::TemperatureScore score = test::score_of(flame, s.done, field);
-  const test::TemperatureScore before = test::score_of(flame, s.done, alone);
+  const test::TemperatureScore score = s.score(field);
+  const test::TemperatureScore before = s.score(alone);
   SCOPED_TRACE(test::words(score, field) + "; alone " + test::words(before, alone));
   EXPECT_LT(score.median, before.median);
   EXPECT_LT(score.most, before.most);
@@ -127,33 +128,28 @@ TEST(TemperatureSlow, OfNoisyPicturesIsBetterSolvedTogetherThanReadVoxelByVoxel)
 }
 
 TEST(TemperatureSlow, OfGoodPicturesIsLeftAsItWasReadWhereLeftOutViewsSpeakAgainstTheRest) {
-  const test::GlowingFlame& flame = flame_of(Emitter::grey);
   const Solved& s = solved_of(Emitter::grey);
-  const TemperatureField field = temperature_of(s.scene, s.done, s.errors, flame.response(), Emitter::grey);
-  const TemperatureField alone =
-      temperature_of(s.scene, test::voxel_by_voxel(s.done), s.errors, flame.response(), Emitter::grey);
+  const TemperatureField field = s.read(Emitter::grey);
+  const TemperatureField alone = s.read_by_voxel(Emitter::grey);
   ASSERT_TRUE(field.summary.joint.left_out.has_value());
   EXPECT_GT(*field.summary.joint.left_out, kMostLeftOutMisfit);
   EXPECT_EQ(field.summary.joint.iterations, 0);
   EXPECT_EQ(field.kelvin, alone.kelvin);
   GlowField<float> together{std::vector<float>(alone.kelvin.size()), alone.kelvin};
-  solve_together(s.scene, s.done, EmitterTable(flame.response(), Emitter::grey), {}, {}, together);
+  solve_together(s.scene, s.done, EmitterTable(s.response, Emitter::grey), {}, {}, together);
   TemperatureField solved_together = alone;
   solved_together.kelvin = together.kelvin;
-  EXPECT_GT(test::score_of(flame, s.done, solved_together).median,
-            test::score_of(flame, s.done, alone).median)
-      << "they were right";
+  EXPECT_GT(s.score(solved_together).median, s.score(alone).median) << "they were right";
 }
 
 TEST(TemperatureSlow, NotKnowingWhatGlowsIsPartOfEachError) {
-  const test::GlowingFlame& flame = flame_of(Emitter::soot);
   const Solved& s = solved_of(Emitter::soot);
-  const TemperatureField told = temperature_of(s.scene, s.done, s.errors, flame.response(), Emitter::grey);
-  const TemperatureField untold = temperature_of(s.scene, s.done, s.errors, flame.response(), std::nullopt);
+  const TemperatureField told = s.read(Emitter::grey);
+  const TemperatureField untold = s.read(std::nullopt);
   EXPECT_TRUE(told.summary.emitter_told);
   EXPECT_FALSE(untold.summary.emitter_told);
-  const test::TemperatureScore mistaken = test::score_of(flame, s.done, told);
-  const test::TemperatureScore honest = test::score_of(flame, s.done, untold);
+  const test::TemperatureScore mistaken = s.score(told);
+  const test::TemperatureScore honest = s.score(untold);
   SCOPED_TRACE(test::words(mistaken, told) + "; untold " + test::words(honest, untold));
   EXPECT_LT(mistaken.within, 0.8) << "soot read as grey, and sure of it";
   EXPECT_GT(honest.within, 0.88);
@@ -161,26 +157,20 @@ TEST(TemperatureSlow, NotKnowingWhatGlowsIsPartOfEachError) {
 }
 
 TEST(TemperatureSlow, AJointSolveThatIsStoppedKeepsWhatItHas) {
-  const test::GlowingFlame& flame = flame_of(Emitter::grey);
   const Solved& s = solved_of(Emitter::grey);
   SolveOptions options;
   options.stop = [] { return true; };
-  const TemperatureField field =
-      temperature_of(s.scene, s.done, s.errors, flame.response(), Emitter::grey, options);
-  const TemperatureField alone =
-      temperature_of(s.scene, test::voxel_by_voxel(s.done), s.errors, flame.response(), Emitter::grey);
+  const TemperatureField field = s.read(Emitter::grey, options);
+  const TemperatureField alone = s.read_by_voxel(Emitter::grey);
   EXPECT_EQ(field.summary.joint.iterations, 0);
   EXPECT_FALSE(field.summary.joint_failed);
   EXPECT_EQ(field.kelvin, alone.kelvin);
 }
 
 TEST(TemperatureSlow, SaysWhatAnotherEmitterWouldMakeOfIt) {
-  const test::GlowingFlame& flame = flame_of(Emitter::soot);
   const Solved& s = solved_of(Emitter::soot);
-  const TemperatureSummary told =
-      temperature_of(s.scene, s.done, s.errors, flame.response(), Emitter::soot).summary;
-  const TemperatureSummary mistaken =
-      temperature_of(s.scene, s.done, s.errors, flame.response(), Emitter::grey).summary;
+  const TemperatureSummary told = s.read(Emitter::soot).summary;
+  const TemperatureSummary mistaken = s.read(Emitter::grey).summary;
   EXPECT_GT(mistaken.mean, told.mean + 60) << "soot taken for grey looks hotter";
   constexpr double kMoved = 5;  // K, what a joint solve may change of a mean: `if_other` is read without one
   EXPECT_NEAR(mistaken.if_other, told.mean, kMoved) << "and that is said";
@@ -188,34 +178,30 @@ TEST(TemperatureSlow, SaysWhatAnotherEmitterWouldMakeOfIt) {
 }
 
 TEST(TemperatureSlow, ThePapersConventionReadsGreenAlone) {
-  const test::GlowingFlame& flame = flame_of(Emitter::grey);
-  const Solved& s = solved_of(Emitter::grey);
-  const TemperatureField field = temperature_of(s.scene, s.done, s.errors, flame.response(), Emitter::paper);
+  Solved s = solved_of(Emitter::grey);
+  const TemperatureField field = s.read(Emitter::paper);
   EXPECT_GT(field.summary.counts.told, 0.9 * static_cast<double>(field.summary.counts.emitting));
   EXPECT_FALSE(field.summary.by_absorption);
-  CameraResponse relative = flame.response();
-  relative.absolute = false;
-  const TemperatureField scaled = temperature_of(s.scene, s.done, s.errors, relative, Emitter::paper);
+  s.response.absolute = false;
+  const TemperatureField scaled = s.read(Emitter::paper);
   EXPECT_NEAR(*std::max_element(scaled.kelvin.begin(), scaled.kelvin.end()), 2300, 30);
   EXPECT_EQ(scaled.summary.chi_square, 0) << "nothing is left to contradict it";
 }
 
 TEST(TemperatureSlow, SaturatedCoresAreBoundsAndBlackPicturesTellNothing) {
-  const test::GlowingFlame& flame = flame_of(Emitter::grey);
   Solved s = solved_of(Emitter::grey);
-  const TemperatureCounts before =
-      temperature_of(s.scene, s.done, s.errors, flame.response(), Emitter::grey).summary.counts;
+  const TemperatureCounts before = s.read(Emitter::grey).summary.counts;
   EXPECT_EQ(before.saturated, 0U);
   for (View& view : s.scene.views) {
     std::vector<std::uint8_t> bounds(view.image->rgb.size() / 3);
     for (std::size_t p = 0; p < bounds.size(); ++p) bounds[p] = view.image->rgb[3 * p] > 120 ? 1 : 0;
     view.bounds = share(std::move(bounds));
   }
-  const TemperatureField bounded = temperature_of(s.scene, s.done, s.errors, flame.response(), Emitter::grey);
+  const TemperatureField bounded = s.read(Emitter::grey);
   EXPECT_GT(bounded.summary.counts.saturated, 100U);
   EXPECT_LT(bounded.summary.counts.told, before.told);
   std::fill(s.done.volume.emission.begin(), s.done.volume.emission.end(), 0.0F);
-  const TemperatureField dark = temperature_of(s.scene, s.done, s.errors, flame.response(), Emitter::grey);
+  const TemperatureField dark = s.read(Emitter::grey);
   EXPECT_EQ(dark.summary.counts.told, 0U);
   EXPECT_EQ(*std::max_element(dark.kelvin.begin(), dark.kelvin.end()), 0);
 }
@@ -224,24 +210,15 @@ TEST(TemperatureSlow, SaturatedCoresAreBoundsAndBlackPicturesTellNothing) {
 TEST(SelfAbsorption, OfABallsMiddleIsTheClosedForm) {
   Reconstruction done;
   Volume& volume = done.volume;
-  volume.grid = {{-0.1F, -0.1F, -0.1F}, 0.2F / 64, 65, 65, 65};
-  volume.emission.assign(3 * volume.grid.size(), 0.0F);
-  volume.extinction.assign(volume.grid.size(), 0.0F);
+  volume.grid = cube_grid(0.2, 64);
   constexpr double kRadius = 0.08;
   constexpr double kAbsorption = 10;
-  for (int k = 0; k < 65; ++k)
-    for (int j = 0; j < 65; ++j)
-      for (int i = 0; i < 65; ++i) {
-        const double r =
-            0.2 / 64 * std::sqrt(std::pow(i - 32, 2) + std::pow(j - 32, 2) + std::pow(k - 32, 2));
-        if (r > kRadius) continue;
-        volume.extinction[volume.grid.index(i, j, k)] = kAbsorption;
-        for (std::size_t c = 0; c < 3; ++c) volume.emission[3 * volume.grid.index(i, j, k) + c] = 100;
-      }
-  PaperSceneOptions film;
-  film.truth_voxels = 2;
-  film.image = {16, 12};
-  const Scene scene = paper_scene(film);
+  each_point(volume.grid, [&](int i, int j, int k) {
+    const bool inside = place_of(volume.grid, i, j, k).norm() <= kRadius;
+    volume.extinction.push_back(inside ? static_cast<float>(kAbsorption) : 0);
+    volume.emission.insert(volume.emission.end(), 3, inside ? 100.F : 0.F);
+  });
+  const Scene scene = paper_scene(small_film({16, 12}, 2));
   const SelfAbsorption own = self_absorption(scene, done, test::lobes(), Emitter::soot);
   ASSERT_EQ(own.factor.size(), volume.emission.size());
   EXPECT_GT(own.channel[2], own.channel[0]) << "blue is absorbed more";
@@ -259,9 +236,7 @@ TEST(ViewErrors, CoverWhatRepeatedNoiseDoes) {
   options.noise = 25;  // so that it outweighs the rest
   options.film.image = {120, 90};
   options.levels = 0;
-  const test::GlowingFlame flame(options);
-  const Solved s = solved(flame, 32);
-  Effects effects = s.done.effects;
+  const Solved s(options, 32);
   constexpr int kRepeats = 12;
   const std::size_t points = s.done.volume.grid.size();
   std::vector<double> sum(points);
@@ -278,10 +253,9 @@ TEST(ViewErrors, CoverWhatRepeatedNoiseDoes) {
             static_cast<float>(25 * random_normal(static_cast<std::uint64_t>(repeat) + 100, v, i));
       noisy.views[v].image = share(std::move(image));
     }
-    const auto other = solve(noisy, s.done.volume.grid, effects, again);
-    ASSERT_TRUE(other.ok()) << other.error().message();
+    const auto other = value_of(solve(noisy, s.done.volume.grid, s.done.effects, again));
     for (std::size_t p = 0; p < points; ++p) {
-      const double d = static_cast<double>(other->volume.emission[3 * p] - s.done.volume.emission[3 * p]);
+      const double d = static_cast<double>(other.volume.emission[3 * p] - s.done.volume.emission[3 * p]);
       sum[p] += d / kRepeats;
       squares[p] += d * d / kRepeats;
     }
@@ -297,13 +271,9 @@ TEST(ViewErrors, CoverWhatRepeatedNoiseDoes) {
 }
 
 TEST(ViewErrors, NeedThreeViews) {
-  const test::GlowingFlame flame(small_flame(Emitter::grey));
-  Scene scene = flame.film();
+  Scene scene = small_flame_scene();
   scene.views.resize(2);
-  Reconstruction done;
-  const auto errors = errors_by_views(scene, done, {});
-  ASSERT_FALSE(errors.ok());
-  EXPECT_THAT(errors.error().message(), HasSubstr("three views"));
+  EXPECT_THAT(errors_by_views(scene, {}, {}), FailsWith("three views"));
 }
 
 }  // namespace

@@ -6,9 +6,10 @@
 
 #include <gmock/gmock.h>
 #include <nlohmann/json.hpp>
-#include <unistd.h>
 
 #include "recon/calibrate/pose.h"
+#include "tests/support/recording.h"
+#include "tests/support/results.h"
 
 namespace emberlock::recon {
 namespace {
@@ -37,19 +38,17 @@ json with(const char* pointer, const json& value) {
 }
 
 TEST(Transforms, TheConventionIsRead) {
-  const auto t = parse(valid());
-  ASSERT_TRUE(t.ok()) << t.error().message();
-  ASSERT_EQ(t->frames.size(), 2U);
-  EXPECT_EQ(t->frames[1].image, fs::path("rig/b.png"));
-  EXPECT_EQ(t->box->size, Eigen::Vector3d(0.2, 0.2, 0.4));
-  const auto lens = intrinsics_of(t->frames[0], {64, 48});
-  ASSERT_TRUE(lens.ok());
-  EXPECT_EQ(lens->fx, 500);
-  EXPECT_EQ(lens->fy, 500) << "one focal length serves both axes";
-  EXPECT_EQ(lens->cx, 32);
-  EXPECT_EQ(lens->cy, 24);
+  const auto t = value_of(parse(valid()));
+  ASSERT_EQ(t.frames.size(), 2U);
+  EXPECT_EQ(t.frames[1].image, fs::path("rig/b.png"));
+  EXPECT_EQ(t.box->size, Eigen::Vector3d(0.2, 0.2, 0.4));
+  const auto lens = value_of(intrinsics_of(t.frames[0], {64, 48}));
+  EXPECT_EQ(lens.fx, 500);
+  EXPECT_EQ(lens.fy, 500) << "one focal length serves both axes";
+  EXPECT_EQ(lens.cx, 32);
+  EXPECT_EQ(lens.cy, 24);
   // The camera stands 0.5 m up the z axis and looks down it.
-  const CameraModel camera{*lens, t->frames[0].camera_from_world};
+  const CameraModel camera{lens, t.frames[0].camera_from_world};
   EXPECT_TRUE(camera.center().isApprox(Eigen::Vector3d(0, 0, 0.5)));
   EXPECT_TRUE(camera.project({0, 0, 0}).isApprox(Eigen::Vector2d(32, 24)));
 }
@@ -58,30 +57,26 @@ TEST(Transforms, AFramesOwnLensStandsBeforeTheFiles) {
   json document = with("/frames/1/fl_x", 700);
   document["frames"][1]["k1"] = -0.1;
   document["frames"][0]["camera_angle_x"] = M_PI / 2;
-  const auto t = parse(document);
-  ASSERT_TRUE(t.ok()) << t.error().message();
-  EXPECT_NEAR(intrinsics_of(t->frames[0], {64, 48})->fx, 32, 1e-9)
+  const auto t = value_of(parse(document));
+  EXPECT_NEAR(intrinsics_of(t.frames[0], {64, 48})->fx, 32, 1e-9)
       << "the frame's angle, not the file's focal length";
-  EXPECT_EQ(intrinsics_of(t->frames[1], {64, 48})->fx, 700);
-  EXPECT_EQ(intrinsics_of(t->frames[1], {64, 48})->distortion.k1, -0.1);
+  EXPECT_EQ(intrinsics_of(t.frames[1], {64, 48})->fx, 700);
+  EXPECT_EQ(intrinsics_of(t.frames[1], {64, 48})->distortion.k1, -0.1);
 }
 
 TEST(Transforms, NerfsOwnDataCarryAnAngleAndNoExtension) {
-  const fs::path folder =
-      fs::temp_directory_path() / ("emberlock_transforms_test." + std::to_string(::getpid()));
+  const test::TempFolder folder;
   fs::create_directories(folder / "train");
   std::ofstream(folder / "train" / "r_0.png") << "x";
-  const auto t = parse_transforms(R"({"camera_angle_x": 0.6911112070083618, "frames": [
+  const auto t = value_of(parse_transforms(R"({"camera_angle_x": 0.6911112070083618, "frames": [
     {"file_path": "./train/r_0", "rotation": 0.012566, "transform_matrix":
       [[-0.9999021887779236,0.004192245192825794,-0.013345719315111637,-0.05379832163453102],
        [-0.013988681137561798,-0.2996590733528137,0.95394366979599,3.845470428466797],
        [-4.656612873077393e-10,0.9540371894836426,0.29968830943107605,1.2080823183059692],[0,0,0,1]]}]})",
-                                  folder / "transforms.json");
-  ASSERT_TRUE(t.ok()) << t.error().message();
-  EXPECT_TRUE(fs::exists(t->frames[0].image)) << t->frames[0].image;
-  EXPECT_NEAR(intrinsics_of(t->frames[0], {800, 800})->fx, 1111.1110311937682, 1e-6);
-  EXPECT_FALSE(t->box);
-  fs::remove_all(folder);
+                                           folder / "transforms.json"));
+  EXPECT_TRUE(fs::exists(t.frames[0].image)) << t.frames[0].image;
+  EXPECT_NEAR(intrinsics_of(t.frames[0], {800, 800})->fx, 1111.1110311937682, 1e-6);
+  EXPECT_FALSE(t.box);
 }
 
 TEST(Transforms, KeysThatSteerTrainingAreIgnored) {
@@ -147,16 +142,13 @@ TEST(Transforms, BadInputNamesTheFieldAndTheRemedy) {
 }
 
 TEST(Transforms, MalformedJsonIsPlaced) {
-  const auto t = parse_transforms("{\n\"frames\": [\n}\n", "t.json");
-  ASSERT_FALSE(t.ok());
-  EXPECT_THAT(t.error().message(), HasSubstr("t.json: malformed JSON at line 3"));
+  EXPECT_THAT(parse_transforms("{\n\"frames\": [\n}\n", "t.json"),
+              FailsWith("t.json: malformed JSON at line 3"));
 }
 
 TEST(Transforms, ATruncatedFileSaysSo) {
   const std::string text = valid().dump();
-  const auto t = parse_transforms(text.substr(0, text.size() / 2), "t.json");
-  ASSERT_FALSE(t.ok());
-  EXPECT_THAT(t.error().message(), HasSubstr("ends too early"));
+  EXPECT_THAT(parse_transforms(text.substr(0, text.size() / 2), "t.json"), FailsWith("ends too early"));
   EXPECT_FALSE(parse_transforms("", "t.json").ok());
 }
 
@@ -171,33 +163,26 @@ TEST(Transforms, DeeplyNestedJsonDoesNotOverflowTheStack) {
 }
 
 TEST(Transforms, AMissingFileIsNamed) {
-  const auto t = read_transforms("no/such/transforms.json");
-  ASSERT_FALSE(t.ok());
-  EXPECT_THAT(t.error().message(), HasSubstr("no/such/transforms.json"));
+  EXPECT_THAT(read_transforms("no/such/transforms.json"), FailsWith("no/such/transforms.json"));
 }
 
 TEST(Transforms, PicturesOfAnotherSizeAreRefused) {
   const auto t = parse(valid());
-  const auto lens = intrinsics_of(t->frames[1], {640, 480});
-  ASSERT_FALSE(lens.ok());
-  EXPECT_THAT(lens.error().message(), HasSubstr("frames[1].w, h"));
-  EXPECT_THAT(lens.error().message(), HasSubstr("640 x 480"));
+  EXPECT_THAT(intrinsics_of(t->frames[1], {640, 480}), FailsWith("frames[1].w, h", "640 x 480"));
 }
 
 TEST(Transforms, NoFocalLengthAnywhereIsSaid) {
   json document = valid();
   document.erase("fl_x");
-  const auto t = parse(document);
-  ASSERT_TRUE(t.ok());
-  EXPECT_THAT(intrinsics_of(t->frames[0], {64, 48}).error().message(), HasSubstr("frames[0].fl_x"));
+  const auto t = value_of(parse(document));
+  EXPECT_THAT(intrinsics_of(t.frames[0], {64, 48}), FailsWith("frames[0].fl_x"));
 }
 
 TEST(Transforms, DistortionThatFoldsThePictureIsRefused) {
   json document = with("/fl_x", 40);
   document["k1"] = -2;
-  const auto t = parse(document);
-  ASSERT_TRUE(t.ok());
-  EXPECT_THAT(intrinsics_of(t->frames[0], {64, 48}).error().message(), HasSubstr("k1"));
+  const auto t = value_of(parse(document));
+  EXPECT_THAT(intrinsics_of(t.frames[0], {64, 48}), FailsWith("k1"));
 }
 
 }  // namespace

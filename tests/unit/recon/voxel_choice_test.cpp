@@ -10,7 +10,9 @@
 #include "recon/pipeline/planned_time.h"
 #include "recon/pipeline/reference_front.h"
 #include "recon/pipeline/single_run.h"
+#include "tests/support/counting_clock.h"
 #include "tests/support/devices.h"
+#include "tests/support/results.h"
 #include "tests/support/small_flame.h"
 
 namespace emberlock::recon {
@@ -18,6 +20,7 @@ namespace {
 
 ON_EACH_DEVICE(VoxelChoiceTest);
 ON_EACH_DEVICE(VoxelChoiceTestSlow);
+using SlowClock = test::CountingClock;
 using testing::Contains;
 using testing::HasSubstr;
 
@@ -71,18 +74,6 @@ TEST(ShippedFront, HoldsWhatTheKneeNeeds) {
   }
 }
 
-/// So much passes at every look.
-class SlowClock final : public Clock {
- public:
-  explicit SlowClock(double tick) : tick_(tick) {}
-  [[nodiscard]] TimePoint now() const override { return time_ = time_ + tick_; }
-  void sleep_until(TimePoint) override {}
-
- private:
-  Seconds tick_;
-  mutable TimePoint time_;
-};
-
 const Scene& pictures() {
   static const Scene scene = small_flame_scene();
   return scene;
@@ -96,9 +87,7 @@ ReconstructOptions unlimited() {
 }
 
 VoxelChoice planned(double tick, const ReconstructOptions& options = unlimited()) {
-  const auto choice = plan_voxels(pictures(), options, SlowClock(tick));
-  EXPECT_TRUE(choice.ok());
-  return choice.ok() ? *choice : VoxelChoice{};
+  return value_of(plan_voxels(pictures(), options, SlowClock(Seconds(tick))));
 }
 
 TEST_P(VoxelChoiceTest, ASlowOrBusyMachineTakesFewerVoxelsAndSaysSo) {
@@ -136,13 +125,11 @@ TEST_P(VoxelChoiceTest, FewerIterationsTakeTheTimeOfThoseIterations) {
 TEST_P(VoxelChoiceTest, AMachineTenTimesAsSlowIsMeasuredAsTenTimesAsSlow) {
   const std::function<void(const Preview&)> nobody;
   const auto unit = [&](double tick) {
-    const SlowClock clock(tick);
+    const SlowClock clock{Seconds(tick)};
     const TimePoint start = clock.now();
     const Task task{*PreparedScene::create(pictures(), {}), device_here(),
                     [&] { return clock.now() - start; }, nobody};
-    const auto measured = calibrate(task, unlimited());
-    EXPECT_TRUE(measured.ok());
-    return measured.ok() ? measured->unit.value() : 0;
+    return value_of(calibrate(task, unlimited())).unit.value();
   };
   const double slow = unit(0.2);  // so slow that there is time for the first solve alone
   EXPECT_GT(slow, 1);
@@ -155,23 +142,20 @@ TEST_P(VoxelChoiceTestSlow, APlanSearchesForTheEffectsAsTheRunDoesAndScalesWithT
   options.solve.compute = {device_here(), 2};
   options.voxels = 24;
   const auto planned_on = [&](double tick) {
-    const SlowClock clock(tick);
+    const SlowClock clock{Seconds(tick)};
     const TimePoint start = clock.now();
     const Task task{*PreparedScene::create(pictures(), {}), device_here(),
                     [&] { return clock.now() - start; }, nobody};
-    auto planned = plan_time(task, options, {});
-    EXPECT_TRUE(planned.ok());
-    return *planned;
+    return value_of(plan_time(task, options, {}));
   };
   const PlannedTime planned = planned_on(1e-3);
-  const auto run = reconstruct(pictures(), options, SlowClock(1e-3));
-  ASSERT_TRUE(run.ok()) << run.error().message();
-  ASSERT_EQ(planned.effects.reports.size(), run->report.effects.size());
+  const auto run = value_of(reconstruct(pictures(), options, SlowClock(Seconds(1e-3))));
+  ASSERT_EQ(planned.effects.reports.size(), run.report.effects.size());
   for (std::size_t i = 0; i < planned.effects.reports.size(); ++i) {
-    EXPECT_EQ(planned.effects.reports[i].on, run->report.effects[i].on) << run->report.effects[i].name;
-    EXPECT_EQ(planned.effects.reports[i].predicted_change, run->report.effects[i].predicted_change);
+    EXPECT_EQ(planned.effects.reports[i].on, run.report.effects[i].on) << run.report.effects[i].name;
+    EXPECT_EQ(planned.effects.reports[i].predicted_change, run.report.effects[i].predicted_change);
   }
-  EXPECT_EQ(planned.searching, run->report.effects_time);
+  EXPECT_EQ(planned.searching, run.report.effects_time);
   EXPECT_GT(planned.solving.value(), 0);
   EXPECT_NEAR(planned_on(1e-2).total() / planned.total(), 10, 1e-6);
 }
@@ -229,19 +213,17 @@ TEST_P(VoxelChoiceTestSlow, SaysWhatTheNextStepWouldBuyAndCost) {
 }
 
 TEST_P(VoxelChoiceTest, TheVoxelsThatWereChosenRepeatTheRun) {
-  const auto chosen = reconstruct(pictures(), unlimited(), SlowClock(1e-3));
-  ASSERT_TRUE(chosen.ok()) << chosen.error().message();
-  const VoxelChoice& choice = chosen->report.voxel_choice;
+  const auto chosen = value_of(reconstruct(pictures(), unlimited(), SlowClock(Seconds(1e-3))));
+  const VoxelChoice& choice = chosen.report.voxel_choice;
   EXPECT_EQ(choice.rule, "knee");
-  EXPECT_EQ(chosen->report.voxels[0], choice.voxels);
+  EXPECT_EQ(chosen.report.voxels[0], choice.voxels);
   EXPECT_GT(choice.calibration_time.value(), 0);
   ReconstructOptions options = unlimited();
   options.voxels = choice.voxels;
-  const auto again = reconstruct(pictures(), options, SlowClock(1e-6));
-  ASSERT_TRUE(again.ok()) << again.error().message();
-  EXPECT_EQ(again->reconstruction.volume.emission, chosen->reconstruction.volume.emission);
-  EXPECT_EQ(again->report.voxel_choice.rule, "asked");
-  const auto told = nlohmann::json::parse(to_json(chosen->report));
+  const auto again = value_of(reconstruct(pictures(), options, SlowClock(Seconds(1e-6))));
+  EXPECT_EQ(again.reconstruction.volume.emission, chosen.reconstruction.volume.emission);
+  EXPECT_EQ(again.report.voxel_choice.rule, "asked");
+  const auto told = nlohmann::json::parse(to_json(chosen.report));
   EXPECT_EQ(told["voxel_choice"]["voxels"], choice.voxels);
   EXPECT_EQ(told["voxel_choice"]["words"].size(), 2U);
   EXPECT_GT(told["trace_sample"]["of"], told["trace_sample"]["pixels"]);
@@ -251,16 +233,14 @@ TEST_P(VoxelChoiceTest, ThePapersRuleAndThePapersSolverMeasureNothing) {
   ReconstructOptions options = unlimited();
   options.rule = VoxelRule::paper;
   options.solve.iterations = 1;
-  const auto by_rule = reconstruct(pictures(), options, SlowClock(1e-6));
-  ASSERT_TRUE(by_rule.ok()) << by_rule.error().message();
-  EXPECT_EQ(by_rule->report.voxels[0], voxels_by_the_paper(pictures()));
-  EXPECT_EQ(by_rule->report.voxel_choice.rule, "paper");
+  const auto by_rule = value_of(reconstruct(pictures(), options, SlowClock(Seconds(1e-6))));
+  EXPECT_EQ(by_rule.report.voxels[0], voxels_by_the_paper(pictures()));
+  EXPECT_EQ(by_rule.report.voxel_choice.rule, "paper");
   options.rule = VoxelRule::knee;
   options.solve.solver = Solver::paper;
-  const auto by_solver = reconstruct(pictures(), options, SlowClock(1e-6));
-  ASSERT_TRUE(by_solver.ok()) << by_solver.error().message();
-  EXPECT_EQ(by_solver->report.voxels[0], finest_voxels(pictures()));
-  EXPECT_EQ(by_solver->report.voxel_choice.rule, "finest");
+  const auto by_solver = value_of(reconstruct(pictures(), options, SlowClock(Seconds(1e-6))));
+  EXPECT_EQ(by_solver.report.voxels[0], finest_voxels(pictures()));
+  EXPECT_EQ(by_solver.report.voxel_choice.rule, "finest");
 }
 
 TEST_P(VoxelChoiceTest, MeasuringEndsAfterAboutASecondHoweverSlowTheMachine) {

@@ -2,7 +2,6 @@
 #include "recon/pipeline/work_precision.h"
 
 #include <algorithm>
-#include <cmath>
 
 #include <gmock/gmock.h>
 #include <rapidcheck.h>

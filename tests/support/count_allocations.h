@@ -7,7 +7,7 @@
 #include <stdexcept>
 
 // Counts what is allocated in one size, such as a picture's: how often somebody copied one. In a program with
-// tests/unit/recon/counting_new.cpp, whose operator new counts.
+// tests/unit/recon_io/counting_new.cpp, whose operator new counts.
 namespace emberlock {
 
 namespace counted {

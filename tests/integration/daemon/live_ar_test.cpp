@@ -18,9 +18,9 @@ using testing::HasSubstr;
 
 constexpr ImageSize kFilmed{320, 240};
 
-class LiveArProgramTest : public testing::Test {
+class LiveArProgramSlow : public testing::Test {
  protected:
-  LiveArProgramTest() {
+  LiveArProgramSlow() {
     film_.lens = {kFilmed, 320, 320, 159, 121, {-0.1, 0, 0, 0, 0}};
     film_.rate = 3;
     film_.frames = 900;  // five minutes: a busy machine takes its time until the flame is shown
@@ -77,7 +77,7 @@ class LiveArProgramTest : public testing::Test {
   std::unique_ptr<daemon::Engine> engine_;
 };
 
-TEST_F(LiveArProgramTest, TheFlameStandsOnTheMarkerAndWhatIsRecordedIsAsFilmed) {
+TEST_F(LiveArProgramSlow, TheFlameStandsOnTheMarkerAndWhatIsRecordedIsAsFilmed) {
   start();
   const daemon::Subscription watcher = board_.want_pictures();
   ASSERT_EQ(show().state(), v1::ArStatus::SHOWN);
@@ -130,7 +130,7 @@ TEST_F(LiveArProgramTest, TheFlameStandsOnTheMarkerAndWhatIsRecordedIsAsFilmed) 
   EXPECT_EQ(first->image->bytes(), filmed->image->bytes());
 }
 
-TEST_F(LiveArProgramTest, ErrorsNameWhatIsWrong) {
+TEST_F(LiveArProgramSlow, ErrorsNameWhatIsWrong) {
   start();
   const auto refused = [&](const char* words) {
     const auto answer = engine_->start_ar(request_);
@@ -150,7 +150,7 @@ TEST_F(LiveArProgramTest, ErrorsNameWhatIsWrong) {
   refused("volume.vdb");
 }
 
-TEST_F(LiveArProgramTest, AMarkerOfAnotherNumberIsNamed) {
+TEST_F(LiveArProgramSlow, AMarkerOfAnotherNumberIsNamed) {
   start();
   const daemon::Subscription watcher = board_.want_pictures();
   request_.set_marker("aruco:4X4_50:8:80mm");

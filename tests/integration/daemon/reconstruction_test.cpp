@@ -232,7 +232,9 @@ class FramesInTurn : public DaemonReconstruction {
   }
 };
 
-TEST_F(FramesInTurn, ASequenceThatWasInterruptedEndsAsIfItHadNotBeen) {
+using FramesInTurnSlow = FramesInTurn;
+
+TEST_F(FramesInTurnSlow, ASequenceThatWasInterruptedEndsAsIfItHadNotBeen) {
   const Shell whole = run("0:2", "whole");
   EXPECT_EQ(whole.status, 0) << whole.output;
   EXPECT_THAT(whole.output, HasSubstr("3 of 3 frames became volumes of 12 voxels"));
@@ -251,7 +253,7 @@ TEST_F(FramesInTurn, ASequenceThatWasInterruptedEndsAsIfItHadNotBeen) {
   EXPECT_THAT(run("1:2", "other").output, HasSubstr("holds a sequence of other frames"));
 }
 
-TEST_F(FramesInTurn, AFrameThatFailedIsTriedAgainAndThoseBehindItAreDoneAgainOnlyOnceItIsAVolume) {
+TEST_F(FramesInTurnSlow, AFrameThatFailedIsTriedAgainAndThoseBehindItAreDoneAgainOnlyOnceItIsAVolume) {
   EXPECT_EQ(run("0:2", "whole").status, 0);
   const fs::path mine = folder_ / "cut/frame-1/mine.txt";  // not to be replaced: the frame fails
   fs::create_directories(mine.parent_path());
@@ -294,7 +296,9 @@ TEST_F(FramesInTurn, ASequenceWhoseFirstFramesFailedBeginsAnew) {
   EXPECT_THAT(again.output, HasSubstr("3 of 3 frames became volumes"));
 }
 
-TEST_F(DaemonReconstruction, FramesThatAreAtWorkAtOnceBecomeWhatTheyBecomeAlone) {
+using DaemonReconstructionSlow = DaemonReconstruction;
+
+TEST_F(DaemonReconstructionSlow, FramesThatAreAtWorkAtOnceBecomeWhatTheyBecomeAlone) {
   const auto run = [&](const char* at_once, const char* out) {
     return shell(fmt::format(
         "{} reconstruct {} --device cpu --voxels 12 --frame 0 --last-frame 2 {} --out {}", EMBERLOCK_PROGRAM,

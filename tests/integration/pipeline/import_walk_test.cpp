@@ -117,7 +117,7 @@ double held_out_error(recon::Scene scene) {
   return outcome.ok() ? (*outcome->report.heldout_rmse)[1] : NAN;
 }
 
-TEST(ImportWalk, FromFilmsToAVolumeThatShowsTheCameraHeldOut) {
+TEST(ImportWalkSlow, FromFilmsToAVolumeThatShowsTheCameraHeldOut) {
   const test::TempFolder folder;
   const std::vector<recon::Scene> scenes = two_flames();
   const test::FlameFilm film = film_of(scenes);

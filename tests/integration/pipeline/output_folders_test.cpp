@@ -367,7 +367,9 @@ TEST_F(OutputFolders, TheTablesHoldEveryVerbThatWritesOne) {
   EXPECT_EQ(found, listed);
 }
 
-TEST_F(OutputFolders, OfAnEarlierResultEveryVerbReplacesItsOwnFilesAlone) {
+using OutputFoldersSlow = OutputFolders;
+
+TEST_F(OutputFoldersSlow, OfAnEarlierResultEveryVerbReplacesItsOwnFilesAlone) {
   for (const Writer& writer : replacing()) {
     SCOPED_TRACE(writer.verb);
     const fs::path out = temp_ / "results" / "out";

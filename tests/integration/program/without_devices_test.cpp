@@ -89,7 +89,7 @@ TEST_F(WithoutDevices, NoTargetLinksTheirLibraries) {
     words >> target;
     for (std::string link; words >> link;) links[target].insert(link);
   }
-  EXPECT_TRUE(links.contains("emberlock_recon"));
+  EXPECT_TRUE(links.contains("emberlock_recon_core"));
   EXPECT_TRUE(links["emberlock_verbs"].contains("emberlock::cli"));
   for (const auto& [target, linked] : links)
     for (const std::string& each : linked)

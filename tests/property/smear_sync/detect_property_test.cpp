@@ -48,7 +48,7 @@ TEST(DetectProperty, FramesWithoutADotShowNone) {
   }
 }
 
-TEST(DetectProperty, ReflectionsWiderThanTheLampShowNoDot) {
+TEST(DetectPropertySlow, ReflectionsWiderThanTheLampShowNoDot) {
   // One in a few thousand does: faint, hardly wider than a small lamp that is clipped, in its glare.
   for (const test::Lookalike kind : test::kReflections)
     EXPECT_LE(test::read_lookalikes(kind, 1000, 18).dots, 1) << "kind " << static_cast<int>(kind);

@@ -12,7 +12,7 @@ namespace emberlock::recon {
 namespace {
 
 constexpr double kPi = 3.14159265358979323846;
-constexpr double kStefanBoltzmann = 5.670374419e-8;  // W / (m^2 K^4), CODATA 2018
+constexpr double kStefanBoltzmannConstant = 5.670374419e-8;  // W / (m^2 K^4), CODATA 2018
 constexpr int kDirections = 64;
 constexpr int kTowards = 4096;
 constexpr int kSpherePoints = 256;
@@ -165,7 +165,7 @@ double total_radiance(const HotVolume& volume, const Eigen::Vector3d& eye, const
     sum += left * taken * s.glow / s.absorption;
     left *= 1 - taken;
   }
-  return kStefanBoltzmann / kPi * sum;
+  return kStefanBoltzmannConstant / kPi * sum;
 }
 
 double radiated_power(const HotVolume& volume, const ComputeOptions& compute) {

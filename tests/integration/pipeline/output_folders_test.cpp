@@ -402,7 +402,7 @@ TEST_F(OutputFoldersSlow, OfAnEarlierResultEveryVerbReplacesItsOwnFilesAlone) {
   }
 }
 
-TEST_F(OutputFolders, AFolderThatNobodyListedIsLeftAlone) {
+TEST_F(OutputFoldersSlow, AFolderThatNobodyListedIsLeftAlone) {
   for (const Writer& writer : replacing()) {
     SCOPED_TRACE(writer.verb);
     for (const char* name :

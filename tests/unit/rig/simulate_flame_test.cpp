@@ -202,7 +202,7 @@ TEST_F(SimulateFlameSlow, LateCamerasFilmLaterAndSaySo) {
   }
 }
 
-TEST_F(SimulateFlameTest, StaggeredCamerasFilmAtInstantsSpreadOverThePeriod) {
+TEST_F(SimulateFlameSlow, StaggeredCamerasFilmAtInstantsSpreadOverThePeriod) {
   SimulateOptions o = small();
   o.frames = 4;
   o.stagger = true;

@@ -313,10 +313,10 @@ test('the volume is seen, and turns by mouse and by key', async () => {
 test('two frames, one after the other, are played', async () => {
   const {cameras, frames} = (decode('ListSessionsResponse', await daemon.call('Sessions/List')) as ListSessionsResponse).sessions.find(({session}) => session === 'walk')!;
   const middle = Math.floor(frames / cameras / 2);
-  // Beside a browser, cameras in real time lose frames: some instants aren't known to all of them.
+  // Next to a browser, cameras in real time lose frames: some instants are not known to all of them.
   let first = middle;
   let ended: ReconstructionStatus | undefined;
-  for (const away of [0, 5, -5, 10, -10]) {
+  for (const away of [0, 5, -5, 10, -10, 15, -15, 20, -20]) {
     first = middle + away;
     await page.getByLabel('Frame of walk to reconstruct', {exact: true}).fill(String(first));
     await page.getByLabel('Last frame of walk to reconstruct, of several').fill(String(first + 1));

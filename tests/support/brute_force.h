@@ -6,9 +6,9 @@
 
 #include <Eigen/Dense>
 
-#include "recon/views/camera_model.h"
 #include "recon/hull/hull.h"
 #include "recon/render/render.h"
+#include "recon/views/camera_model.h"
 
 // The model of the march in double precision: tiny steps from the camera, no lists, no clipping.
 namespace emberlock::recon {

@@ -49,7 +49,8 @@ class HttpServerTest : public testing::Test {
   /// What comes until it has these words, or the server ends.
   static std::string read_until(const UniqueFd& client, const std::string& words) {
     std::string answer;
-    for (char c = 0; answer.find(words) == std::string::npos && ::read(client.get(), &c, 1) == 1;) answer += c;
+    for (char c = 0; answer.find(words) == std::string::npos && ::read(client.get(), &c, 1) == 1;)
+      answer += c;
     return answer;
   }
 

@@ -81,7 +81,8 @@ class SimulateFlameTest : public testing::Test {
       most = std::max(most, *std::max_element(view.image->rgb.begin(), view.image->rgb.end()));
     return most;
   }
-  const test::TempFolder folder_;
+  const test::TempFolder temp_{test::TempFolder::On::disk};
+  const std::filesystem::path folder_ = temp_ / "simulate-flame";
 };
 
 TEST_F(SimulateFlameTest, LeavesASessionAndItsTruth) {
@@ -179,6 +180,7 @@ TEST_F(SimulateFlameSlow, TwiceTheExposureIsTwiceTheLight) {
   std::vector<float> most;
   for (const double ms : {0.5, 1.0}) {
     o.exposure = milliseconds(ms);
+    std::filesystem::remove_all(folder_);
     ASSERT_TRUE(simulate_flame(o, folder_).ok());
     const recon::Volume volume = truth(0);
     most.push_back(*std::max_element(volume.emission.begin(), volume.emission.end()));

@@ -41,8 +41,9 @@ std::vector<fs::path> files_of(const fs::path& input, const SceneOptions& option
   if (const auto transforms = read_transforms(input)) {
     if (transforms->camera_response) files.push_back(*transforms->camera_response);
     for (const TransformsFrame& frame : transforms->frames) {
-      files.push_back(frame.image);
-      if (frame.mask) files.push_back(*frame.mask);
+      // Frames that aren't chosen may lack theirs.
+      if (fs::exists(frame.image, ec)) files.push_back(frame.image);
+      if (frame.mask && fs::exists(*frame.mask, ec)) files.push_back(*frame.mask);
     }
   }
   return files;

@@ -56,7 +56,8 @@ Texture texture_of(const tinygltf::Model& model, int index, std::size_t& texels)
       fmt::format("images[{}]{}", from.source, file.uri.empty() ? "" : " (" + file.uri + ")");
   if (file.image.empty()) refuse("isn't there", where, "Put the picture where the file names it");
   const auto decoded = session::decode_still_image(
-      {reinterpret_cast<const char*>(file.image.data()), file.image.size()}, where);
+      {reinterpret_cast<const char*>(file.image.data()), file.image.size()}, where,
+      session::Alpha::dropped);  // alphaMode states what the alpha means
   if (!decoded) throw Unreadable{decoded.error()};
   const ImageView picture = decoded->view();
   Texture out;

@@ -24,9 +24,10 @@ std::size_t edits(std::string_view a, std::string_view b) {
 
 }  // namespace
 
-std::optional<std::string> nearest(std::string_view given, const std::vector<std::string>& known) {
+std::optional<std::string> nearest(std::string_view given, const std::vector<std::string>& known,
+                                   std::optional<std::size_t> most) {
   std::optional<std::string> best;
-  std::size_t fewest = std::max<std::size_t>(2, given.size() / 3) + 1;
+  std::size_t fewest = most.value_or(std::max<std::size_t>(2, given.size() / 3)) + 1;
   if (given.size() > 64) return best;
   for (const std::string& name : known) {
     const std::size_t distance = edits(given, name);

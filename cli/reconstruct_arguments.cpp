@@ -36,17 +36,6 @@ Status parse_voxels(const std::string& text, recon::ReconstructOptions& options)
   return {};
 }
 
-/// with_views(); or why the views can't be used.
-Result<recon::Scene> choose_views(const recon::Scene& scene, int views) {
-  const auto inputs = std::count_if(scene.views.begin(), scene.views.end(),
-                                    [](const recon::View& v) { return v.role == recon::ViewRole::input; });
-  if (views > inputs) {
-    return Error{ErrorKind::bad_input, "there are " + std::to_string(inputs) + " input views", "--views",
-                 "Give at most so many"};
-  }
-  return recon::with_views(scene, views);
-}
-
 }  // namespace
 
 Result<recon::Box> parse_box(const std::string& text) {
@@ -140,8 +129,9 @@ Result<recon::SceneOptions> scene_options_of(const ReconstructArguments& argumen
 Result<recon::Scene> load_views(const ReconstructArguments& arguments, const Progress& progress) {
   EMBERLOCK_ASSIGN_OR_RETURN(recon::SceneOptions options, scene_options_of(arguments));
   options.progress = progress;
+  options.held_out = arguments.held_out;
+  options.views = arguments.views;
   EMBERLOCK_ASSIGN_OR_RETURN(recon::Scene scene, recon::load_scene(arguments.input, options));
-  EMBERLOCK_RETURN_IF_ERROR(recon::hold_out(scene, arguments.held_out));
   if (arguments.shrink > 1) {
     for (recon::View& view : scene.views) {
       const auto [width, height] = view.image->size;
@@ -151,7 +141,7 @@ Result<recon::Scene> load_views(const ReconstructArguments& arguments, const Pro
       view = recon::shrunk(view, arguments.shrink);
     }
   }
-  return choose_views(scene, arguments.views);
+  return scene;
 }
 
 std::vector<std::filesystem::path> inputs_of(const ReconstructArguments& arguments) {
@@ -250,7 +240,8 @@ void add_range_options(const Verb& verb, ReconstructArguments& a) {
 
 void add_frame_options(const Verb& verb, ReconstructArguments& a) {
   verb.add_option("--frame", a.frame,
-                  "Sessions only: number of the first camera's frame [the middle one that all cameras have]")
+                  "Number of the first camera's frame [the middle one that all cameras have]; of a "
+                  "transforms.json with times: number of the instant")
       .check_not_negative();
   verb.add_option(
           "--last-frame", a.last_frame,

@@ -110,6 +110,19 @@ Status check_alike(const CameraPart& a, const CameraPart& b) {
   return {};
 }
 
+/// A session has no place for masks, and its frames are of one instant each.
+Status check_importable(const recon::Transforms& scene) {
+  for (const recon::TransformsFrame& frame : scene.frames) {
+    if (frame.mask)
+      return Error{ErrorKind::bad_input, "a session holds no masks", frame.where + ".mask_path",
+                   "Reconstruct the transforms.json itself, or remove the masks"};
+    if (frame.time != scene.frames.front().time)
+      return Error{ErrorKind::bad_input, "the pictures are of several instants", frame.where + ".time",
+                   "Give a transforms.json of one instant's pictures, or of films"};
+  }
+  return {};
+}
+
 }  // namespace
 
 std::optional<fs::path> transforms_in(const fs::path& path) {
@@ -122,6 +135,7 @@ std::optional<fs::path> transforms_in(const fs::path& path) {
 Result<ImportResult> import_transforms(const fs::path& transforms, const ImportOptions& options,
                                        const Observer& observer, const ReportsOf& reports) {
   EMBERLOCK_ASSIGN_OR_RETURN(const recon::Transforms scene, recon::read_transforms(transforms));
+  EMBERLOCK_RETURN_IF_ERROR(check_importable(scene));
   std::vector<fs::path> inputs{transforms};
   for (const recon::TransformsFrame& frame : scene.frames) inputs.push_back(frame.image);
   EMBERLOCK_ASSIGN_OR_RETURN(const auto response, recon::response_of(scene));
@@ -153,6 +167,8 @@ Result<ImportResult> import_transforms(const fs::path& transforms, const ImportO
     parts.push_back(std::move(part));
   }
   result.instants = parts.front().places.size();
+  if (std::string warning = recon::passed_over_warning(scene); !warning.empty())
+    result.notes.push_back(std::move(warning));
   if (result.instants > 1)
     result.notes.emplace_back(
         "NOT SYNCHRONISED: frames are paired by their numbers, as the file says, not as a strobe proves; "

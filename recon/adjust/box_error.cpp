@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "recon/views/view.h"
+
 namespace emberlock::recon {
 namespace {
 
@@ -12,14 +14,30 @@ int multiples(int from, int to, int stride) {
   return (to + stride - 1) / stride - (from + stride - 1) / stride;
 }
 
+/// Pixels of a box that an error counts: on the stride's grid and not left out.
+double counted_pixels(const PixelBox& b, int stride, const ProblemPicture& picture) {
+  double pixels = static_cast<double>(multiples(b.x0, b.x1, stride)) * multiples(b.y0, b.y1, stride);
+  if (!picture.bounds) return pixels;
+  const auto width = static_cast<std::size_t>(picture.image->size.width);
+  const auto first = [stride](int from) { return (from + stride - 1) / stride * stride; };
+  for (int y = first(b.y0); y < b.y1; y += stride)
+    for (int x = first(b.x0); x < b.x1; x += stride)
+      pixels -=
+          is_left_out((*picture.bounds)[static_cast<std::size_t>(y) * width + static_cast<std::size_t>(x)])
+              ? 1
+              : 0;
+  return pixels;
+}
+
 }  // namespace
 
 ErrorOverBoxes::ErrorOverBoxes(const std::vector<PixelBox>& boxes, const Problem& problem,
                                ResidualEngine& engine, int stride, std::optional<std::size_t> rays)
     : engine_(engine) {
   std::vector<WeighedBox> weighed;
-  for (const PixelBox& b : boxes) {
-    const double pixels = static_cast<double>(multiples(b.x0, b.x1, stride)) * multiples(b.y0, b.y1, stride);
+  for (std::size_t v = 0; v < boxes.size(); ++v) {
+    const PixelBox& b = boxes[v];
+    const double pixels = counted_pixels(b, stride, problem.pictures[v]);
     const double views = static_cast<double>(boxes.size());
     weighed.push_back({b.x0, b.y0, b.x1, b.y1, static_cast<float>(1 / (std::max(1.0, pixels) * views))});
   }

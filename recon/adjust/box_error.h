@@ -17,8 +17,8 @@ class ErrorOverBoxes {
  public:
   ErrorOverBoxes(const std::vector<PixelBox>& boxes, const Problem& problem, ResidualEngine& engine,
                  int stride = 1, std::optional<std::size_t> rays = std::nullopt);
-  /// RMSE for R, G, B: the mean square over each view's box, then over the views, of the engine's residuals
-  /// as they are now.
+  /// RMSE for R, G, B: the mean square over each view's box, without pixels that are left out, then over the
+  /// views, of the engine's residuals as they are now.
   [[nodiscard]] std::array<double, 3> operator()() const;
   /// The same for pictures that show only the background.
   [[nodiscard]] std::array<double, 3> black() const;

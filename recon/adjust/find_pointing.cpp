@@ -54,6 +54,14 @@ double lowest(double left, double middle, double right) {
   return curvature > 0 ? std::clamp(0.5 * (left - right) / curvature, -0.5, 0.5) : 0;
 }
 
+/// Blackens what the view's picture leaves out, which is black there.
+void hide_left_out(const View& view, RadianceImage& shown) {
+  if (!view.bounds) return;
+  for (std::size_t p = 0; p < view.bounds->size(); ++p)
+    if (is_left_out((*view.bounds)[p]))
+      std::fill_n(shown.rgb.begin() + static_cast<std::ptrdiff_t>(3 * p), 3, 0.F);
+}
+
 PointingError register_to(const RadianceImage& seen, const RadianceImage& shown, const PixelBox& flame) {
   const int reach =
       std::max(2, static_cast<int>(kFarthestShare * std::max(flame.x1 - flame.x0, flame.y1 - flame.y0)));
@@ -142,9 +150,9 @@ class PointingProbe {
     descent.settle();
     const Volume volume = to_volume(descent.engine().get(), level.problem, *hull, effects_);
     const View& left = small_.views[view];
-    const RadianceImage shown =
-        render_view(volume, *hull, effects_, left.camera,
-                    {.compute = options_.compute, .background = left.background.get()});
+    RadianceImage shown = render_view(volume, *hull, effects_, left.camera,
+                                      {.compute = options_.compute, .background = left.background.get()});
+    hide_left_out(left, shown);
     const double error = all_channels(rmse(shown, *left.image, boxes_[view]));
     return LeftOut{error * error, register_to(*left.image, shown, boxes_[view])};
   } catch (const Diverged&) {

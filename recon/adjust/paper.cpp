@@ -85,10 +85,14 @@ Status check_paper(const Scene& scene, const Effects& effects, const SolveOption
   if (effects.exposure.shutter == Exposure::Shutter::integrated)
     return refuse("the paper's solver knows no exposure time", "effects",
                   "Use --solver default, or leave exposure out");
-  const bool bounds = std::any_of(scene.views.begin(), scene.views.end(), [](const View& view) {
-    return view.role == ViewRole::input && view.bounds &&
-           std::any_of(view.bounds->begin(), view.bounds->end(), [](std::uint8_t bits) { return bits != 0; });
-  });
+  const auto any_input = [&](bool (*has)(const View&)) {
+    return std::any_of(scene.views.begin(), scene.views.end(),
+                       [&](const View& view) { return view.role == ViewRole::input && has(view); });
+  };
+  if (any_input(leaves_out))
+    return refuse("the paper's solver uses every pixel, and masks leave some out", "effects",
+                  "Use --solver default, or pictures without masks");
+  const bool bounds = any_input(marks_saturation);
   if (effects.sensor.clipping == Sensor::Clipping::at_white || bounds)
     return refuse(bounds ? "the paper's solver takes saturated pixels for what they show, and some are"
                          : "the paper's solver takes saturated pixels for what they show",

@@ -13,7 +13,7 @@ namespace emberlock::recon {
 std::array<double, 3> rmse(const RadianceImage& a, const RadianceImage& b, const PixelBox& box);
 
 /// The same of a view against its rendering. A rendering that is brighter than a saturated pixel has no error
-/// there.
+/// there; pixels that are left out don't count.
 std::array<double, 3> rmse(const View& view, const RadianceImage& rendered, const PixelBox& box);
 
 /// The three channels as one number: the root of the mean of their squares.

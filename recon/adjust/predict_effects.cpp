@@ -301,8 +301,7 @@ void Predictor::choose_saturation() {
   const double white = by_hand() ? told : clip_level(flame_.scene, boxes_, told);
   if (white <= 0) {
     const std::vector<View>& views = flame_.scene.views;
-    const bool marked =
-        std::any_of(views.begin(), views.end(), [](const View& view) { return view.bounds != nullptr; });
+    const bool marked = std::any_of(views.begin(), views.end(), marks_saturation);
     return leave_out("saturation",
                      marked ? "saturated pixels are bounds already" : "no pixels pile up at white");
   }

@@ -11,6 +11,7 @@
 #include "base/file.h"
 #include "base/nesting.h"
 #include "recon/calibrate/pose.h"
+#include "recon/calibrate/transforms_fields.h"
 
 namespace emberlock::recon {
 namespace fs = std::filesystem;
@@ -24,40 +25,7 @@ constexpr double kLargestPixels = 1e7;
 constexpr double kLargestImage = 65536;
 constexpr std::size_t kLargestFile = std::size_t{64} << 20;
 
-constexpr std::array kLensKeys = {
-    "fl_x", "fl_y", "camera_angle_x", "camera_angle_y", "cx", "cy", "w", "h", "k1", "k2", "k3", "p1",
-    "p2",   "k4",   "is_fisheye",     "camera_model"};
-// Written by Blender's NeRF export, instant-ngp and nerfstudio; none of them affects rays.
-constexpr std::array kIgnoredKeys = {"aabb",
-                                     "aabb_scale",
-                                     "applied_scale",
-                                     "applied_transform",
-                                     "auto_scale_poses_override",
-                                     "colmap_im_id",
-                                     "comment",
-                                     "depth_file_path",
-                                     "depth_path",
-                                     "enable_depth_loading",
-                                     "fps",
-                                     "integer_depth_scale",
-                                     "mask_path",
-                                     "n_extra_learnable_dims",
-                                     "offset",
-                                     "orientation_override",
-                                     "ply_file_path",
-                                     "render_aabb",
-                                     "rotation",
-                                     "scale",
-                                     "sharpness",
-                                     "time",
-                                     "up"};
-constexpr std::array kPinholeModels = {"OPENCV", "PINHOLE", "SIMPLE_PINHOLE", "RADIAL", "SIMPLE_RADIAL"};
 constexpr std::array kImageExtensions = {".png", ".pgm", ".ppm", ".tif", ".tiff", ".jpg", ".jpeg", ".fits"};
-
-template <class List>
-bool contains(const List& list, std::string_view word) {
-  return std::any_of(list.begin(), list.end(), [&](const char* w) { return word == w; });
-}
 
 /// The path of a field in messages: "transforms.json: frames[3].transform_matrix".
 struct Place {
@@ -75,6 +43,8 @@ struct Place {
 };
 
 Result<double> as_number(const json& value, const Place& place) {
+  if (value.is_null())
+    return place.error("is NaN, infinite or null, not a finite number", "Give a finite number");
   if (!value.is_number())
     return place.error(std::string("is ") + value.type_name() + ", not a number", "Give a number");
   const auto number = value.get<double>();
@@ -104,48 +74,30 @@ Status read(const json& object, const char* key, const Place& place, Range range
   return {};
 }
 
-Status check_keys(const json& object, const Place& place, std::initializer_list<const char*> own) {
-  for (const auto& [key, value] : object.items()) {
-    if (contains(own, key) || contains(kLensKeys, key) || contains(kIgnoredKeys, key)) continue;
-    return place.at(key).error("unknown key", "Remove it, or correct its spelling");
-  }
-  return {};
-}
-
-Status check_pinhole(const json& object, const Place& place) {
-  if (const auto it = object.find("camera_model"); it != object.end()) {
-    if (!it->is_string() || !contains(kPinholeModels, it->get_ref<const std::string&>())) {
-      return place.at("camera_model")
-          .error(it->dump() + " is no pinhole camera",
-                 "Undistort the pictures to OPENCV or PINHOLE and export again");
-    }
-  }
-  for (const char* key : {"is_fisheye", "k4"}) {
-    const auto it = object.find(key);
-    if (it != object.end() && *it != false && *it != 0) {
-      return place.at(key).error("fisheye lenses are not modelled",
-                                 "Undistort the pictures to OPENCV or PINHOLE and export again");
-    }
-  }
-  return {};
-}
-
 Status read_lens(const json& object, const Place& place, LensFields& lens) {
-  EMBERLOCK_RETURN_IF_ERROR(check_pinhole(object, place));
   constexpr Range kFocal = {1e-3, kLargestPixels};
   constexpr Range kAngle = {1e-6, 3.14};
+  constexpr Range kDegrees = {1e-4, 179.9};
   constexpr Range kCenter = {-kLargestPixels, kLargestPixels};
   constexpr Range kSize = {1, kLargestImage};
   constexpr Range kCoefficient = {-1e3, 1e3};
   // A frame's own angle overrides the focal length of the file.
-  if (object.contains("camera_angle_x")) lens.fl_x.reset();
-  if (object.contains("camera_angle_y")) lens.fl_y.reset();
+  if (object.contains("camera_angle_x") || object.contains("x_fov")) lens.fl_x.reset();
+  if (object.contains("camera_angle_y") || object.contains("y_fov")) lens.fl_y.reset();
   EMBERLOCK_RETURN_IF_ERROR(read(object, "fl_x", place, kFocal, lens.fl_x));
   EMBERLOCK_RETURN_IF_ERROR(read(object, "fl_y", place, kFocal, lens.fl_y));
   EMBERLOCK_RETURN_IF_ERROR(read(object, "camera_angle_x", place, kAngle, lens.camera_angle_x));
   EMBERLOCK_RETURN_IF_ERROR(read(object, "camera_angle_y", place, kAngle, lens.camera_angle_y));
+  for (const auto& [key, angle] :
+       {std::pair{"x_fov", &lens.camera_angle_x}, std::pair{"y_fov", &lens.camera_angle_y}}) {
+    std::optional<double> degrees;
+    EMBERLOCK_RETURN_IF_ERROR(read(object, key, place, kDegrees, degrees));
+    if (degrees) *angle = *degrees * M_PI / 180;
+  }
   EMBERLOCK_RETURN_IF_ERROR(read(object, "cx", place, kCenter, lens.cx));
   EMBERLOCK_RETURN_IF_ERROR(read(object, "cy", place, kCenter, lens.cy));
+  EMBERLOCK_RETURN_IF_ERROR(read(object, "width", place, kSize, lens.w));
+  EMBERLOCK_RETURN_IF_ERROR(read(object, "height", place, kSize, lens.h));
   EMBERLOCK_RETURN_IF_ERROR(read(object, "w", place, kSize, lens.w));
   EMBERLOCK_RETURN_IF_ERROR(read(object, "h", place, kSize, lens.h));
   Distortion& d = lens.distortion;
@@ -219,17 +171,24 @@ Result<Rigid3> read_pose(const json& value, const Place& place) {
   return camera_from_world_of_opengl(m);
 }
 
-/// NeRF's own data omit the extension: use the first image of that name.
-fs::path find_image(const fs::path& folder, const std::string& file_path) {
-  fs::path path = folder / file_path;
+/// The file of a path in the document. NeRF's own data omit the extension: the first image of that name.
+/// Where no such file exists, backslashes are Windows' separators.
+fs::path find_image(const fs::path& folder, std::string file_path) {
   std::error_code ec;
-  if (fs::is_regular_file(path, ec)) return path;
-  for (const char* extension : kImageExtensions) {
-    fs::path candidate = path;
-    candidate += extension;
-    if (fs::is_regular_file(candidate, ec)) return candidate;
-  }
-  return path;
+  const auto completed = [&]() -> std::optional<fs::path> {
+    const fs::path path = folder / file_path;
+    if (fs::is_regular_file(path, ec)) return path;
+    for (const char* extension : kImageExtensions) {
+      fs::path candidate = path;
+      candidate += extension;
+      if (fs::is_regular_file(candidate, ec)) return candidate;
+    }
+    return std::nullopt;
+  };
+  if (const auto found = completed()) return *found;
+  const fs::path as_written = folder / file_path;
+  std::replace(file_path.begin(), file_path.end(), '\\', '/');
+  return completed().value_or(as_written);
 }
 
 /// A path in the document, not empty.
@@ -244,10 +203,11 @@ Result<std::string> read_path(const json& object, const char* key, const Place& 
   return text;
 }
 
+constexpr Range kTime = {-1e18, 1e18};  // of any unit
+
 Result<TransformsFrame> read_frame(const json& object, const Place& place, const fs::path& folder,
                                    const LensFields& shared) {
   if (!object.is_object()) return place.error("is no object", "A frame has file_path and transform_matrix");
-  EMBERLOCK_RETURN_IF_ERROR(check_keys(object, place, {"file_path", "transform_matrix"}));
   TransformsFrame frame;
   frame.where = place.file + ": " + place.field;
   frame.lens = shared;
@@ -256,6 +216,12 @@ Result<TransformsFrame> read_frame(const json& object, const Place& place, const
   EMBERLOCK_ASSIGN_OR_RETURN(const std::string text,
                              read_path(object, "file_path", place, "no picture is named"));
   frame.image = find_image(folder, text);
+  if (object.contains("mask_path") && !object["mask_path"].is_null()) {
+    EMBERLOCK_ASSIGN_OR_RETURN(const std::string mask,
+                               read_path(object, "mask_path", place, "no picture is named"));
+    frame.mask = find_image(folder, mask);
+  }
+  EMBERLOCK_RETURN_IF_ERROR(read(object, "time", place, kTime, frame.time));
 
   const auto matrix = object.find("transform_matrix");
   if (matrix == object.end()) {
@@ -266,19 +232,41 @@ Result<TransformsFrame> read_frame(const json& object, const Place& place, const
   return frame;
 }
 
-Result<json> parse(std::string_view text, const Place& place, const std::string& source) {
-  EMBERLOCK_RETURN_IF_ERROR(check_json_nesting(text, source));
+/// What the parser expected instead; empty where it gives no reason.
+std::string expectation(const std::string& message) {
+  const auto at = message.rfind("; expected ");
+  return at == std::string::npos ? "" : ": " + message.substr(at + 2);
+}
+
+Result<json> parse(std::string_view foreign, const Place& place, const std::string& source) {
+  EMBERLOCK_RETURN_IF_ERROR(check_json_nesting(foreign, source));
+  const std::string text = with_null_for_nan(foreign);
   try {
     return json::parse(text);
   } catch (const json::parse_error& e) {
     const auto byte = std::min<std::size_t>(e.byte, text.size());
     const auto line = 1 + std::count(text.begin(), text.begin() + static_cast<std::ptrdiff_t>(byte), '\n');
-    const bool cut = byte >= text.size();
-    return place.error("malformed JSON at line " + std::to_string(line) + ", byte " + std::to_string(e.byte),
-                       cut ? "The file ends too early: copy it again" : "Correct the syntax there");
+    return place.error(
+        "malformed JSON at line " + std::to_string(line) + ", byte " + std::to_string(e.byte) +
+            expectation(e.what()),
+        ends_too_early(text) ? "The file ends too early: copy it again" : "Correct the syntax there");
   } catch (const json::exception& e) {
     return place.error(std::string("malformed JSON: ") + e.what(), "Correct the value");
   }
+}
+
+/// Keys of instant-ngp that choose among frames and pixels.
+Status read_choices(const json& document, const Place& top, Transforms& transforms) {
+  if (const auto white = document.find("white_transparent"); white != document.end())
+    transforms.white_is_transparent = *white != false && *white != 0;
+  std::optional<int> frames;
+  EMBERLOCK_RETURN_IF_ERROR(read(document, "n_frames", top, {1, 1e9}, frames));
+  if (frames && static_cast<std::size_t>(*frames) < document["frames"].size())
+    return top.at("n_frames")
+        .error(std::to_string(*frames) + ", but there are " + std::to_string(document["frames"].size()) +
+                   " frames",
+               "Leave the frames out that aren't meant, or correct n_frames");
+  return {};
 }
 
 }  // namespace
@@ -287,12 +275,12 @@ Result<Transforms> parse_transforms(std::string_view text, const fs::path& sourc
   const Place top{source.string(), ""};
   EMBERLOCK_ASSIGN_OR_RETURN(const json document, parse(text, top, source.string()));
   if (!document.is_object()) return top.error("is no transforms.json", R"(Give an object with "frames")");
-  EMBERLOCK_RETURN_IF_ERROR(check_keys(document, top, {"frames", "box", "camera_response"}));
+  Transforms transforms;
+  transforms.where = source.string();
+  EMBERLOCK_ASSIGN_OR_RETURN(transforms.passed_over, check_transforms_keys(document, source.string()));
   LensFields shared;
   EMBERLOCK_RETURN_IF_ERROR(read_lens(document, top, shared));
 
-  Transforms transforms;
-  transforms.where = source.string();
   if (document.contains("camera_response")) {
     EMBERLOCK_ASSIGN_OR_RETURN(const std::string response,
                                read_path(document, "camera_response", top, "no file is named"));
@@ -305,11 +293,7 @@ Result<Transforms> parse_transforms(std::string_view text, const fs::path& sourc
   if (frames == document.end() || !frames->is_array() || frames->empty()) {
     return top.at("frames").error("there are no frames", "Give one entry for each picture");
   }
-  if (frames->size() > kMaxViews) {
-    return top.at("frames").error(
-        std::to_string(frames->size()) + " frames are more than the 64 that one volume takes",
-        "Choose the best 64");
-  }
+  EMBERLOCK_RETURN_IF_ERROR(read_choices(document, top, transforms));
   for (std::size_t i = 0; i < frames->size(); ++i) {
     EMBERLOCK_ASSIGN_OR_RETURN(TransformsFrame frame, read_frame((*frames)[i], top.at("frames").at(i),
                                                                  source.parent_path(), shared));
@@ -321,6 +305,12 @@ Result<Transforms> parse_transforms(std::string_view text, const fs::path& sourc
 Result<Transforms> read_transforms(const fs::path& path) {
   EMBERLOCK_ASSIGN_OR_RETURN(const std::string text, read_file(path, kLargestFile));
   return parse_transforms(text, path);
+}
+
+std::string passed_over_warning(const Transforms& transforms) {
+  std::string keys;
+  for (const std::string& key : transforms.passed_over) keys += (keys.empty() ? "" : ", ") + key;
+  return keys.empty() ? "" : transforms.where + ": keys without a known meaning were passed over: " + keys;
 }
 
 Result<std::shared_ptr<const CameraResponse>> response_of(const Transforms& transforms) {

@@ -30,7 +30,9 @@ struct LensFields {
 
 struct TransformsFrame {
   std::filesystem::path image;  ///< file on disk; relative paths start from the folder of the json
-  Rigid3 camera_from_world;     ///< OpenCV axes
+  std::optional<std::filesystem::path> mask = {};  ///< `mask_path`, likewise: pixels of 0 are left out
+  std::optional<double> time = {};                 ///< of any unit; frames of one time belong together
+  Rigid3 camera_from_world;                        ///< OpenCV axes
   LensFields lens;
   std::string where;  ///< "path/transforms.json: frames[3]", for messages
 };
@@ -38,21 +40,26 @@ struct TransformsFrame {
 /// The calibration in a transforms.json, in the convention of NeRF (Mildenhall 2020) and instant-ngp (Mueller
 /// 2022). `transform_matrix` is world_from_camera with OpenGL's camera axes (x right, y up, z backward),
 /// world in metres. Its 3 x 3 part must be a rotation to within 1 %, times any uniform positive scale (some
-/// exporters leave one, and it has no effect on rays); it is replaced by the closest rotation. Keys for
-/// training (aabb_scale, scale, offset, sharpness, ...) are accepted and ignored; any other key is an error.
+/// exporters leave one, and it has no effect on rays); it is replaced by the closest rotation.
+/// transforms_fields.h lists the keys that are used, refused and ignored.
 struct Transforms {
-  std::vector<TransformsFrame> frames;  ///< 1..kMaxViews
+  std::vector<TransformsFrame> frames;  ///< 1 or more
   std::optional<Box> box;               ///< `"box": {"center": [x, y, z], "size": [x, y, z]}`, our extension
   /// `"camera_response": "response.json"`, our extension: of all cameras (camera_response.h); relative paths
   /// start from the folder of the json.
   std::optional<std::filesystem::path> camera_response = {};
-  std::string where = {};  ///< "path/transforms.json", for messages
+  bool white_is_transparent = false;          ///< `white_transparent`
+  std::vector<std::string> passed_over = {};  ///< unknown keys, sorted, each once
+  std::string where = {};                     ///< "path/transforms.json", for messages
 };
 
 /// `json` is the content of the file, `source` its path. Accesses the disk only to complete a `file_path`
-/// without extension. Errors name the file, the field and the remedy.
+/// without extension or with Windows' separators. Errors name the file, the field and the remedy.
 Result<Transforms> parse_transforms(std::string_view json, const std::filesystem::path& source);
 Result<Transforms> read_transforms(const std::filesystem::path& path);
+
+/// The warning that names the keys that were passed over; empty where none was.
+std::string passed_over_warning(const Transforms& transforms);
 
 /// The cameras' response; null if the file names none. Errors name the file and its field, then those of
 /// read_camera_response().

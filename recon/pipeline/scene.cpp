@@ -7,11 +7,8 @@
 #include <system_error>
 
 #include "recon/calibrate/transforms.h"
-#include "recon/hull/find_box.h"
 #include "recon/pipeline/session_scene.h"
-#include "recon/preprocess/develop.h"
-#include "recon/views/flame_mask.h"
-#include "session/media/frame_file.h"
+#include "recon/pipeline/transforms_scene.h"
 #include "session/reader.h"
 
 namespace emberlock::recon {
@@ -22,41 +19,16 @@ Error bad(std::string where, std::string what, std::string remedy) {
   return {ErrorKind::bad_input, std::move(what), std::move(where), std::move(remedy)};
 }
 
-Result<Scene> load_transforms(const fs::path& path, const SceneOptions& options) {
-  if (options.frame) return bad(path.string(), "has one instant only", "Leave --frame out");
-  if (options.rig) return bad(path.string(), "holds its own calibration", "Leave --rig out");
-  EMBERLOCK_ASSIGN_OR_RETURN(const Transforms transforms, read_transforms(path));
-  Scene scene;
-  EMBERLOCK_ASSIGN_OR_RETURN(scene.response, response_of(transforms));
-  scene.preprocessing = {{"all", false, "pictures of a transforms.json are taken as they are"}};
-  for (const TransformsFrame& frame : transforms.frames) {
-    auto image = session::read_image(frame.image);
-    if (!image) {
-      return Error{image.error().kind, image.error().message(), frame.where + ".file_path",
-                   "Correct file_path, or bring the picture there"};
-    }
-    View view;
-    view.name = frame.image.filename().string();
-    EMBERLOCK_ASSIGN_OR_RETURN(view.camera.intrinsics, intrinsics_of(frame, image->layout().size));
-    view.camera.camera_from_world = frame.camera_from_world;
-    view.image = share(as_filmed(share(std::move(*image))));
-    scene.views.push_back(std::move(view));
-  }
-  if (options.box || transforms.box) {
-    scene.box = options.box ? *options.box : *transforms.box;
-  } else {
-    EMBERLOCK_ASSIGN_OR_RETURN(scene.box,
-                               find_box(scene, flame_masks(scene, {}, {Device::cpu, options.threads})));
-  }
-  return scene;
-}
-
 }  // namespace
 
 Result<Scene> load_scene(const fs::path& input, const SceneOptions& options) {
   std::error_code ec;
   if (!fs::is_directory(input, ec)) return load_transforms(input, options);
-  if (session::SessionReader::is_session(input)) return load_session(input, options);
+  if (session::SessionReader::is_session(input)) {
+    EMBERLOCK_ASSIGN_OR_RETURN(Scene scene, load_session(input, options));
+    EMBERLOCK_RETURN_IF_ERROR(choose_views(scene, options));
+    return scene;
+  }
   return bad(input.string(), "is a folder without manifest.json, so no session",
              "Name a session's folder, or the transforms.json itself");
 }
@@ -68,27 +40,31 @@ std::vector<fs::path> files_of(const fs::path& input, const SceneOptions& option
   if (!fs::is_regular_file(input, ec)) return files;
   if (const auto transforms = read_transforms(input)) {
     if (transforms->camera_response) files.push_back(*transforms->camera_response);
-    for (const TransformsFrame& frame : transforms->frames) files.push_back(frame.image);
+    for (const TransformsFrame& frame : transforms->frames) {
+      // Frames that aren't chosen may lack theirs.
+      if (fs::exists(frame.image, ec)) files.push_back(frame.image);
+      if (frame.mask && fs::exists(*frame.mask, ec)) files.push_back(*frame.mask);
+    }
   }
   return files;
 }
 
-Scene with_views(const Scene& scene, int count) {
+std::vector<std::size_t> spread_views(const Scene& scene, int count) {
   const auto sight = [&](std::size_t i) {
     return Eigen::Vector3d((scene.views[i].camera.center() - scene.box.center).normalized());
   };
+  std::vector<std::size_t> kept;
   std::vector<std::size_t> left;
-  for (std::size_t i = 0; i < scene.views.size(); ++i) {
-    if (scene.views[i].role == ViewRole::input) left.push_back(i);
-  }
-  if (count <= 0 || count >= static_cast<int>(left.size())) return scene;
-  std::vector<std::size_t> kept{left.front()};
-  left.erase(left.begin());
-  while (static_cast<int>(kept.size()) < count) {
+  for (std::size_t i = 0; i < scene.views.size(); ++i)
+    (scene.views[i].role == ViewRole::input ? left : kept).push_back(i);
+  const std::size_t held_out = kept.size();
+  if (count <= 0 || count >= static_cast<int>(left.size())) count = static_cast<int>(left.size());
+  while (static_cast<int>(kept.size() - held_out) < count) {
     // Opposite views lie on one line and see the same outline, hence the cosine's absolute value.
     const auto nearness = [&](std::size_t i) {
       double largest = 0;
-      for (const std::size_t k : kept) largest = std::max(largest, std::abs(sight(i).dot(sight(k))));
+      for (std::size_t k = held_out; k < kept.size(); ++k)
+        largest = std::max(largest, std::abs(sight(i).dot(sight(kept[k]))));
       return largest;
     };
     const auto next = std::min_element(
@@ -96,13 +72,25 @@ Scene with_views(const Scene& scene, int count) {
     kept.push_back(*next);
     left.erase(next);
   }
+  std::sort(kept.begin(), kept.end());
+  return kept;
+}
+
+Scene with_views(const Scene& scene, int count) {
   Scene fewer = scene;
   fewer.views.clear();
-  for (std::size_t i = 0; i < scene.views.size(); ++i) {
-    if (scene.views[i].role == ViewRole::held_out || std::find(kept.begin(), kept.end(), i) != kept.end())
-      fewer.views.push_back(scene.views[i]);
-  }
+  for (const std::size_t i : spread_views(scene, count)) fewer.views.push_back(scene.views[i]);
   return fewer;
+}
+
+Status choose_views(Scene& scene, const SceneOptions& options) {
+  EMBERLOCK_RETURN_IF_ERROR(hold_out(scene, options.held_out));
+  const auto inputs = std::count_if(scene.views.begin(), scene.views.end(),
+                                    [](const View& v) { return v.role == ViewRole::input; });
+  if (options.views > inputs)
+    return bad("--views", "there are " + std::to_string(inputs) + " input views", "Give that number at most");
+  if (options.views > 0) scene = with_views(scene, options.views);
+  return {};
 }
 
 Status hold_out(Scene& scene, const std::vector<int>& views) {

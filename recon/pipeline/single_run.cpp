@@ -87,7 +87,8 @@ Report describe(const Scene& scene, const Grid& grid, const SolveOptions& option
   report.finest_voxels = finest_voxels(scene);
   report.voxel_choice.voxels = std::max({grid.nx, grid.ny, grid.nz}) - 1;
   report.voxel_choice.by_the_paper = voxels_by_the_paper(scene);
-  report.warnings = coverage_warnings(scene);
+  report.warnings = scene.warnings;
+  for (std::string& warning : coverage_warnings(scene)) report.warnings.push_back(std::move(warning));
   if (std::string warning = too_fine_warning(scene, report.voxel_choice.voxels); !warning.empty())
     report.warnings.push_back(std::move(warning));
   report.preprocessing = scene.preprocessing;

@@ -37,10 +37,11 @@ bool Saturation::at(const Eigen::Vector3d& point) const {
     if (!(at.x() >= 0 && at.y() >= 0 && at.x() < size.width && at.y() < size.height)) continue;
     const auto pixel = static_cast<std::size_t>(at.y()) * static_cast<std::size_t>(size.width) +
                        static_cast<std::size_t>(at.x());
+    if (view->bounds && is_left_out((*view->bounds)[pixel])) continue;
     ++seen;
     const float* rgb = &view->image->rgb[3 * pixel];
     const bool white = std::max({rgb[0], rgb[1], rgb[2]}) >= kWhite;
-    bound += white || (view->bounds != nullptr && (*view->bounds)[pixel] != 0) ? 1 : 0;
+    bound += white || (view->bounds != nullptr && is_saturated((*view->bounds)[pixel])) ? 1 : 0;
   }
   return 2 * bound > seen;
 }

@@ -66,9 +66,20 @@ Blocks blocks_of(const std::vector<float>& bright, ImageSize size, const NoiseBl
   return blocks;
 }
 
+/// Removes the blocks in which a pixel is infinitely dark.
+void remove_left_out(Blocks& blocks) {
+  const auto left_out = [](double mean) { return std::isinf(mean); };
+  for (std::size_t b = blocks.means.size(); b-- > 0;) {
+    if (!left_out(blocks.means[b])) continue;
+    blocks.means.erase(blocks.means.begin() + static_cast<std::ptrdiff_t>(b));
+    blocks.peaks.erase(blocks.peaks.begin() + static_cast<std::ptrdiff_t>(b));
+  }
+}
+
 NoiseThreshold noise_threshold(const std::vector<float>& bright, ImageSize size) {
   const NoiseBlocks grid = noise_blocks(size);
   Blocks blocks = blocks_of(bright, size, grid);
+  remove_left_out(blocks);
   return noise_threshold(grid, blocks.means, blocks.peaks);
 }
 
@@ -123,6 +134,52 @@ void take_out_specks(FlameMask& mask) {
   mask.box = box_of(mask.flame, mask.size);
 }
 
+/// Adds to the mask the pixels that are left out, and to its box those of them that flame may continue
+/// behind: that touch it, directly or by others.
+void add_left_out(FlameMask& mask, const std::vector<std::uint8_t>& marks) {
+  const int width = mask.size.width;
+  std::vector<std::uint8_t> continued = mask.flame;
+  std::vector<int> next;
+  for (std::size_t p = 0; p < continued.size(); ++p)
+    if (continued[p] != 0) next.push_back(static_cast<int>(p));
+  const auto look_at = [&](int x, int y) {
+    if (x < 0 || y < 0 || x >= width || y >= mask.size.height) return;
+    const std::size_t p = row_begin(mask.size, y) + static_cast<std::size_t>(x);
+    if (continued[p] != 0 || !is_left_out(marks[p])) return;
+    continued[p] = 1;
+    next.push_back(static_cast<int>(p));
+  };
+  while (!next.empty()) {
+    const int x = next.back() % width;
+    const int y = next.back() / width;
+    next.pop_back();
+    look_at(x - 1, y);
+    look_at(x + 1, y);
+    look_at(x, y - 1);
+    look_at(x, y + 1);
+  }
+  mask.box = box_of(continued, mask.size);
+  for (std::size_t p = 0; p < marks.size(); ++p)
+    if (is_left_out(marks[p])) mask.flame[p] = 1;
+}
+
+/// The mask of a view with pixels that are left out, which show no noise.
+FlameMask mask_of_marked(const View& view, std::optional<double> threshold) {
+  std::vector<float> bright = brightness(*view.image);
+  for (std::size_t p = 0; p < bright.size(); ++p)
+    if (is_left_out((*view.bounds)[p])) bright[p] = -std::numeric_limits<float>::infinity();
+  const ImageSize size = view.image->size;
+  FlameMask mask = mask_above(bright, size, threshold ? *threshold : noise_threshold(bright, size).value);
+  if (!threshold) take_out_specks(mask);
+  add_left_out(mask, *view.bounds);
+  return mask;
+}
+
+FlameMask mask_of(const View& view, std::optional<double> threshold) {
+  if (leaves_out(view)) return mask_of_marked(view, threshold);
+  return threshold ? flame_mask(*view.image, *threshold) : noise_mask(*view.image);
+}
+
 }  // namespace
 
 NoiseBlocks noise_blocks(ImageSize size) {
@@ -166,7 +223,9 @@ std::vector<FlameMask> flame_masks(const Scene& scene, std::optional<double> thr
                                    const ComputeOptions& compute) {
   if constexpr (kCudaBuilt) {
     const Result<Device> device = resolve(compute.device);
-    if (device.ok() && *device == Device::cuda) {
+    // A GPU knows pictures only, not which of their pixels are left out.
+    if (device.ok() && *device == Device::cuda &&
+        std::none_of(scene.views.begin(), scene.views.end(), leaves_out)) {
       use_gpu(device->gpu);
       std::vector<SharedImage> pictures;
       for (const View& view : scene.views) pictures.push_back(view.image);
@@ -177,8 +236,7 @@ std::vector<FlameMask> flame_masks(const Scene& scene, std::optional<double> thr
   Pool pool(compute.threads);
   pool.run(static_cast<int>(masks.size()), [&](int v) {
     const auto i = static_cast<std::size_t>(v);
-    const RadianceImage& image = *scene.views[i].image;
-    masks[i] = threshold ? flame_mask(image, *threshold) : noise_mask(image);
+    masks[i] = mask_of(scene.views[i], threshold);
   });
   return masks;
 }

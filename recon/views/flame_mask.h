@@ -19,7 +19,8 @@ struct PixelBox {
   [[nodiscard]] bool empty() const { return x1 <= x0 || y1 <= y0; }
 };
 
-/// Which pixels show the flame: those whose brightest channel lies above the threshold.
+/// Which pixels show the flame: those whose brightest channel lies above the threshold. Pixels that a view
+/// leaves out count as flame, since it may burn behind them; the box holds those that touch a seen flame.
 struct FlameMask {
   ImageSize size;
   double threshold = 0;             ///< grey levels

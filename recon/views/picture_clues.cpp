@@ -150,7 +150,7 @@ double clip_level(const Scene& scene, const std::vector<PixelBox>& boxes, double
   constexpr double kBlackLevel = 16;
   double lowest = 0;
   for (std::size_t v = 0; v < scene.views.size(); ++v) {
-    if (scene.views[v].role != ViewRole::input || scene.views[v].bounds) continue;
+    if (scene.views[v].role != ViewRole::input || marks_saturation(scene.views[v])) continue;
     for (std::size_t c = 0; c < 3; ++c) {
       const double top =
           static_cast<double>(Channel(*scene.views[v].image, c, boxes[v]).shared_top().value_or(0));

@@ -14,8 +14,15 @@ namespace emberlock::session {
 
 /// PNM, PNG, JPEG or TIFF, by their magic numbers.
 bool is_still_image(std::string_view head);
-/// `content` is the whole file; `where` names it in errors.
-Result<Image> decode_still_image(std::string_view content, const std::string& where);
+/// What becomes of an image's transparency (alpha, or a colour that a PNG declares transparent).
+enum class Alpha {
+  over_black,  ///< colour times alpha: the light that the picture adds to a dark room
+  dropped,     ///< colours as they are stored, for formats that use the alpha otherwise
+};
+/// `content` is the whole file; `where` names it in errors. Errors: truncated, damaged or too large; a TIFF
+/// whose fourth sample has no stated meaning and isn't opaque; a TIFF of grey and a second sample.
+Result<Image> decode_still_image(std::string_view content, const std::string& where,
+                                 Alpha alpha = Alpha::over_black);
 
 /// Of a whole PNG or JPEG, without decoding it. Errors: it is neither, or truncated.
 Result<ImageSize> picture_size(std::string_view content, const std::string& where);

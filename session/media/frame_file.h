@@ -25,7 +25,8 @@ enum class Colours {
 };
 
 /// Frames of a foreign file: one image (PGM, PPM, PNG, JPEG, TIFF, FITS) or a video that FFmpeg reads. Grey
-/// stays grey, colour becomes rgb8 or rgb16. 10..16-bit samples keep their values; bit_depth comes from the
+/// stays grey, colour becomes rgb8 or rgb16; an image with alpha becomes what it shows over black (colour
+/// times alpha). 10..16-bit samples keep their values; bit_depth comes from the
 /// file's maximum value (a PGM with maxval 4095 has 12 bits).
 class FrameFile {
  public:

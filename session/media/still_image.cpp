@@ -98,19 +98,47 @@ Result<Image> decode_binary_pnm(std::string_view content, const std::string& whe
   return image;
 }
 
+/// How a still image stores what is transparent.
+enum class Transparency {
+  none,
+  straight,       ///< a fourth sample, by which the colours are not multiplied yet
+  premultiplied,  ///< a fourth sample, by which they are
+  unnamed,        ///< a fourth sample of no stated meaning
+  grey_key,       ///< pixels of the grey value `key`
+};
+
 struct StillSize {
   std::int64_t width = 0;
   std::int64_t height = 0;
+  Transparency transparency = Transparency::none;
+  std::uint32_t key = 0;
+  bool is_grey = false;  ///< looked at where there is a fourth sample
 };
+
+/// The grey value of a PNG's chunk tRNS, as a decoded sample.
+std::uint32_t grey_key(std::string_view s, std::size_t chunk) {
+  const unsigned depth = byte_at(s, 24);
+  const std::uint32_t value = big16(s, chunk + 8);
+  return depth < 8 ? value * 255 / ((1U << depth) - 1) : value;
+}
 
 /// Walks the chunks of a PNG to its end.
 Result<StillSize> check_png(std::string_view s, const std::string& where) {
   if (s.size() < 33) return truncated(where, "PNG");
-  const StillSize size{big32(s, 16), big32(s, 20)};
+  StillSize size{big32(s, 16), big32(s, 20)};
+  const Byte colours = byte_at(s, 25);  // 0 grey, 2 RGB, 3 palette, 4 grey and alpha, 6 RGB and alpha
+  size.is_grey = colours == 4;
+  if (colours == 4 || colours == 6) size.transparency = Transparency::straight;
   for (std::size_t at = 8; at + 12 <= s.size();) {
     if (s.substr(at + 4, 4) == "IEND") return size;
     const std::size_t length = big32(s, at);
     if (length > s.size() - at - 12) break;
+    if (s.substr(at + 4, 4) == "tRNS" && length >= 2 && colours == 0) {
+      size.transparency = Transparency::grey_key;
+      size.key = grey_key(s, at);
+    } else if (s.substr(at + 4, 4) == "tRNS" && colours <= 3) {
+      size.transparency = Transparency::straight;
+    }
     at += 12 + length;
   }
   return truncated(where, "PNG");
@@ -139,7 +167,13 @@ Result<StillSize> check_jpeg(std::string_view s, const std::string& where) {
   return truncated(where, "JPEG");
 }
 
-/// Reads width and height from the first directory of a TIFF (tags 256 and 257).
+/// The meaning of a TIFF's sample after the colours (tag 338).
+Transparency transparency_of(std::uint32_t extra_sample) {
+  if (extra_sample == 1) return Transparency::premultiplied;
+  return extra_sample == 2 ? Transparency::straight : Transparency::unnamed;
+}
+
+/// Reads width, height and samples from the first directory of a TIFF (tags 256, 257, 258, 277 and 338).
 Result<StillSize> check_tiff(std::string_view s, const std::string& where) {
   const bool big = s[0] == 'M';
   const auto get16 = [&](std::size_t i) {
@@ -152,13 +186,88 @@ Result<StillSize> check_tiff(std::string_view s, const std::string& where) {
   const std::size_t entries = get16(directory);
   if (directory + 2 + entries * 12 > s.size()) return truncated(where, "TIFF");
   StillSize size;
+  std::uint32_t samples = 1;
+  std::uint32_t bits = 8;
+  std::uint32_t extra = 0;
   for (std::size_t i = 0; i < entries; ++i) {
     const std::size_t entry = directory + 2 + i * 12;
-    const std::int64_t value = get16(entry + 2) == 3 ? get16(entry + 8) : get32(entry + 8);
-    if (get16(entry) == 256) size.width = value;
-    if (get16(entry) == 257) size.height = value;
+    const bool is_short = get16(entry + 2) == 3;
+    // More than two short values stand elsewhere; the first one is enough.
+    const std::size_t elsewhere = is_short && get32(entry + 4) > 2 ? get32(entry + 8) : entry + 8;
+    if (elsewhere + 4 > s.size()) continue;  // the decoder refuses it
+    const std::uint32_t value = is_short ? get16(elsewhere) : get32(elsewhere);
+    switch (get16(entry)) {
+      case 256:
+        size.width = value;
+        break;
+      case 257:
+        size.height = value;
+        break;
+      case 258:
+        bits = value;
+        break;
+      case 277:
+        samples = value;
+        break;
+      case 338:
+        extra = value;
+        break;
+      default:
+        break;
+    }
   }
+  if (samples == 2)
+    return Error{ErrorKind::bad_input, "the TIFF has grey and a second sample, which isn't read", where,
+                 "Convert it to PNG"};
+  if (samples == 4) size.transparency = transparency_of(extra);
+  // The decoder multiplies samples of 8 bits.
+  if (size.transparency == Transparency::straight && bits <= 8)
+    size.transparency = Transparency::premultiplied;
   return size;
+}
+
+/// Blue, green, red and alpha, as OpenCV stores them, over black: colour times alpha, without the alpha.
+template <class Sample>
+cv::Mat over_black(const cv::Mat& mat, bool multiply) {
+  constexpr std::uint32_t kOpaque = std::numeric_limits<Sample>::max();
+  cv::Mat out(mat.rows, mat.cols, CV_MAKETYPE(mat.depth(), 3));
+  for (int y = 0; y < mat.rows; ++y) {
+    const Sample* in = mat.ptr<Sample>(y);
+    Sample* to = out.ptr<Sample>(y);
+    for (int x = 0; x < mat.cols; ++x, in += 4, to += 3) {
+      const std::uint32_t alpha = multiply ? in[3] : kOpaque;
+      for (int c = 0; c < 3; ++c) to[c] = static_cast<Sample>((in[c] * alpha + kOpaque / 2) / kOpaque);
+    }
+  }
+  return out;
+}
+
+template <class Sample>
+bool is_opaque(const cv::Mat& mat) {
+  for (int y = 0; y < mat.rows; ++y)
+    for (int x = 0; x < mat.cols; ++x)
+      if (mat.ptr<Sample>(y)[4 * x + 3] != std::numeric_limits<Sample>::max()) return false;
+  return true;
+}
+
+/// What the decoded image shows over black.
+Result<cv::Mat> without_transparency(const cv::Mat& mat, const StillSize& still, Alpha alpha,
+                                     const std::string& where) {
+  const bool wide = mat.depth() == CV_16U;
+  if (mat.channels() == 1 && still.transparency == Transparency::grey_key && alpha == Alpha::over_black) {
+    cv::Mat out = mat.clone();
+    out.setTo(0, mat == static_cast<double>(still.key));
+    return out;
+  }
+  if (mat.channels() != 4 || (mat.depth() != CV_8U && !wide)) return mat;
+  if (still.transparency == Transparency::unnamed &&
+      !(wide ? is_opaque<std::uint16_t>(mat) : is_opaque<Byte>(mat)))
+    return Error{ErrorKind::bad_input, "the meaning of its fourth sample isn't stated (ExtraSamples)", where,
+                 "Write it as straight or premultiplied alpha, or without it"};
+  const bool multiply = still.transparency == Transparency::straight && alpha == Alpha::over_black;
+  cv::Mat out = wide ? over_black<std::uint16_t>(mat, multiply) : over_black<Byte>(mat, multiply);
+  if (still.is_grey) cv::extractChannel(out, out, 0);
+  return out;
 }
 
 Result<Image> from_mat(const cv::Mat& mat, const std::string& where) {
@@ -205,26 +314,31 @@ Result<ImageSize> picture_size(std::string_view content, const std::string& wher
   return ImageSize{static_cast<int>(size.width), static_cast<int>(size.height)};
 }
 
-Result<Image> decode_still_image(std::string_view content, const std::string& where) {
+Result<Image> decode_still_image(std::string_view content, const std::string& where, Alpha alpha) {
   if (is_pnm(content) && (content[1] == '5' || content[1] == '6')) return decode_binary_pnm(content, where);
   // OpenCV allocates whatever the header states and accepts truncated files, so both are checked first.
+  StillSize still;
   if (!is_pnm(content)) {
-    EMBERLOCK_ASSIGN_OR_RETURN(const StillSize size, is_png(content)    ? check_png(content, where)
-                                                     : is_jpeg(content) ? check_jpeg(content, where)
-                                                                        : check_tiff(content, where));
-    EMBERLOCK_RETURN_IF_ERROR(check_image_size(size.width, size.height, where));
+    EMBERLOCK_ASSIGN_OR_RETURN(still, is_png(content)    ? check_png(content, where)
+                                      : is_jpeg(content) ? check_jpeg(content, where)
+                                                         : check_tiff(content, where));
+    EMBERLOCK_RETURN_IF_ERROR(check_image_size(still.width, still.height, where));
   }
   if (content.size() > static_cast<std::size_t>(std::numeric_limits<int>::max())) {
     return Error{ErrorKind::bad_input, "larger than 2 GiB", where, "Crop the image"};
   }
   // As stored: an EXIF orientation is ignored, because rows and columns must be the sensor's.
-  const int flags = cv::IMREAD_ANYCOLOR | cv::IMREAD_ANYDEPTH | cv::IMREAD_IGNORE_ORIENTATION;
+  const bool has_alpha =
+      still.transparency != Transparency::none && still.transparency != Transparency::grey_key;
+  const int flags = has_alpha ? cv::IMREAD_UNCHANGED
+                              : cv::IMREAD_ANYCOLOR | cv::IMREAD_ANYDEPTH | cv::IMREAD_IGNORE_ORIENTATION;
   try {
     // imdecode doesn't write, but cv::Mat has no view of constant bytes.
     const cv::Mat bytes(1, static_cast<int>(content.size()), CV_8U, const_cast<char*>(content.data()));
     const cv::Mat mat = cv::imdecode(bytes, flags);
     if (mat.empty()) return damaged(where, "image", "it can't be decoded");
-    return from_mat(mat, where);
+    EMBERLOCK_ASSIGN_OR_RETURN(const cv::Mat shown, without_transparency(mat, still, alpha, where));
+    return from_mat(shown, where);
   } catch (const cv::Exception& e) {
     return damaged(where, "image", e.err);
   }

@@ -38,5 +38,35 @@ TEST(Nesting, SiblingsAreNotDeep) {
   EXPECT_TRUE(check_json_nesting(text + "0]", "a").ok());
 }
 
+TEST(Nesting, ACommaBeforeAClosingBracketIsPlaced) {
+  for (const char* text : {"[1,\n2,\n]", "{\"a\": 1,\n\"b\": \"]\" ,\n\n}", "[[],\n{},]"})
+    EXPECT_THAT(check_json_nesting(text, "a.json").error().message(),
+                HasSubstr("a comma stands before the closing"))
+        << text;
+  EXPECT_THAT(check_json_nesting("[1,\n2,\n]", "a.json").error().what, HasSubstr("line 2"));
+  for (const char* text : {"[1, 2]", R"([",", "],", "\\",[",]"]])", R"({"a,": "}"})", "", "[\n]"})
+    EXPECT_TRUE(check_json_nesting(text, "a.json").ok()) << text;
+}
+
+TEST(Nesting, Utf16IsNamed) {
+  using namespace std::string_view_literals;
+  for (const std::string_view text : {"\xff\xfe{\0}\0"sv, "\xfe\xff\0{\0}"sv, "{\0}\0"sv, "\0{\0}"sv})
+    EXPECT_THAT(check_json_nesting(text, "a.json").error().message(), HasSubstr("UTF-16"));
+  EXPECT_TRUE(check_json_nesting("\xef\xbb\xbf{}", "a.json").ok()) << "a mark of UTF-8";
+}
+
+TEST(Nesting, AnEndThatIsMissingIsSeen) {
+  const std::string whole = R"({"a": [1, "}]", {"b": "\\\""}], "c": 2})";
+  EXPECT_FALSE(ends_too_early(whole));
+  for (std::size_t n = 0; n < whole.size(); ++n) EXPECT_TRUE(ends_too_early(whole.substr(0, n))) << n;
+  EXPECT_FALSE(ends_too_early("{\"a\": 1 \"b\": 2}")) << "malformed, but whole";
+}
+
+TEST(Nesting, NumbersThatAreNoneBecomeNullOutsideOfStrings) {
+  EXPECT_EQ(with_null_for_nan(R"([NaN, -Infinity,Infinity, nan, -inf, "NaN", {"inf": inf}])"),
+            R"([null, null,null, null, null, "NaN", {"inf": null}])");
+  EXPECT_EQ(with_null_for_nan("[1, Name, Nano, xNaN, true]"), "[1, Name, Nano, xNaN, true]");
+}
+
 }  // namespace
 }  // namespace emberlock

@@ -102,12 +102,14 @@ TEST(Transforms, BadInputNamesTheFieldAndTheRemedy) {
   const json mirrored = json::parse("[[-1,0,0,0],[0,1,0,0],[0,0,1,0],[0,0,0,1]]");
   const json transposed = json::parse("[[1,0,0,0],[0,1,0,0],[0,0,1,0],[0,0,0.5,1]]");
   const std::vector<BadCase> cases{
-      {"unknown key at the top", with("/colour", 1), "json: colour"},
-      {"unknown key in a frame", with("/frames/1/colour", 1), "frames[1].colour"},
+      {"misspelled key at the top", with("/camera_angel_x", 1), "json: camera_angel_x"},
+      {"misspelled key in a frame", with("/frames/1/mask-path", "m.png"), "frames[1].mask-path"},
+      {"a frame's key at the top", with("/mask_path", "m.png"), "json: mask_path"},
+      {"the file's key in a frame", with("/frames/1/box", 1), "frames[1].box"},
       {"unknown key in the box", with("/box/centre", 1), "box.centre"},
       {"no frames", with("/frames", json::array()), "json: frames"},
       {"frames of another type", with("/frames", 3), "json: frames"},
-      {"65 frames", with("/frames", json(65, valid()["frames"][0])), "json: frames"},
+      {"fewer frames meant than there are", with("/n_frames", 1), "json: n_frames"},
       {"a frame that is a number", with("/frames/1", 7), "frames[1]"},
       {"singular matrix", with("/frames/1/transform_matrix", singular), "frames[1].transform_matrix"},
       {"sheared matrix", with("/frames/1/transform_matrix", sheared), "frames[1].transform_matrix"},
@@ -144,6 +146,37 @@ TEST(Transforms, BadInputNamesTheFieldAndTheRemedy) {
 TEST(Transforms, MalformedJsonIsPlaced) {
   EXPECT_THAT(parse_transforms("{\n\"frames\": [\n}\n", "t.json"),
               FailsWith("t.json: malformed JSON at line 3"));
+  const auto missing_comma = parse_transforms("{\"w\": 1\n\"h\": 2}", "t.json");
+  EXPECT_THAT(missing_comma, FailsWith("line 2", "expected ','"));
+  EXPECT_THAT(missing_comma.error().remedy, testing::Not(HasSubstr("too early")));
+}
+
+TEST(Transforms, NumbersThatPythonWritesForNoNumberNameTheirFrame) {
+  for (const char* word : {"NaN", "Infinity", "-Infinity"}) {
+    std::string text = valid().dump();
+    text.replace(text.rfind("0.1"), 3, word);
+    EXPECT_THAT(parse_transforms(text, "t.json"),
+                FailsWith("frames[1].transform_matrix[0][3]", "not a finite number"))
+        << word;
+  }
+  std::string text = with("/frames/0/sharpness", 7.25).dump();
+  text.replace(text.find("7.25"), 4, "NaN");
+  EXPECT_TRUE(parse_transforms(text, "t.json").ok()) << "the key is ignored";
+}
+
+TEST(Transforms, BackslashesAreSeparatorsWhereNoSuchFileExists) {
+  const test::TempFolder folder;
+  fs::create_directories(folder / "images");
+  for (const char* name : {"images/a.png", "b\\c.png"}) std::ofstream(folder / name) << "x";
+  const auto image = [&](const std::string& path) {
+    return value_of(parse_transforms(with("/frames/0/file_path", path).dump(), folder / "t.json"))
+        .frames[0]
+        .image;
+  };
+  for (const char* path : {"images\\a.png", ".\\images\\a.png", "images\\a", "./images\\a.png"})
+    EXPECT_TRUE(fs::exists(image(path))) << path;
+  EXPECT_EQ(image("b\\c.png"), folder / "b\\c.png") << "a file of that very name";
+  EXPECT_THAT(image("lost\\a.png").string(), testing::EndsWith("lost\\a.png"));
 }
 
 TEST(Transforms, ATruncatedFileSaysSo) {

@@ -55,9 +55,8 @@ std::vector<std::string> distinct_ids(const std::vector<std::string>& pictures, 
   std::vector<std::string> ids;
   const auto try_part = [&](std::size_t at) {
     if (!ids.empty()) return;
-    ids = ids_by(pictures, parts, [at](const Parts& p) {
-      return p.empty() ? std::string() : p[std::min(at, p.size() - 1)];
-    });
+    ids = ids_by(pictures, parts,
+                 [at](const Parts& p) { return p.empty() ? std::string() : p[std::min(at, p.size() - 1)]; });
   };
   if (by == NamedBy::picture) try_part(deepest);
   for (std::size_t at = 0; at < deepest; ++at) try_part(at);

@@ -35,8 +35,9 @@ Result<Intrinsics> kalibr_lens(const YAML::Node& camera, const std::string& wher
   const auto projection = camera["camera_model"].as<std::string>("");
   const auto distortion = camera["distortion_model"].as<std::string>("none");
   if (projection != "pinhole" || (distortion != "radtan" && distortion != "none")) {
-    return bad_kalibr(where, fmt::format("the lens model \"{}-{}\" isn't modelled{}", projection, distortion,
-                                         distortion == "equidistant" ? ": it is a fisheye" : ""),
+    return bad_kalibr(where,
+                      fmt::format("the lens model \"{}-{}\" isn't modelled{}", projection, distortion,
+                                  distortion == "equidistant" ? ": it is a fisheye" : ""),
                       "Calibrate with Kalibr's pinhole-radtan, or undistort the pictures");
   }
   EMBERLOCK_ASSIGN_OR_RETURN(const auto p, kalibr_numbers(camera, "intrinsics", 4, where));
@@ -70,8 +71,7 @@ Result<Rigid3> kalibr_step(const YAML::Node& camera, const std::string& where) {
     step.translation[at] = row[3];
   }
   const auto rotation = nearest_rotation(step.rotation);
-  if (!rotation)
-    return bad_kalibr(where + ".T_cn_cnm1", rotation.error().what, rotation.error().remedy);
+  if (!rotation) return bad_kalibr(where + ".T_cn_cnm1", rotation.error().what, rotation.error().remedy);
   step.rotation = *rotation;
   return step;
 }

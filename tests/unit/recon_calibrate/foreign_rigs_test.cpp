@@ -80,28 +80,29 @@ struct NumberedModel {
   std::int32_t number;
   std::vector<double> parameters;
 };
-const std::vector<NumberedModel> kModels = {{"SIMPLE_PINHOLE", 0, {500, 320, 240}},
-                                            {"PINHOLE", 1, {500, 510, 320, 240}},
-                                            {"SIMPLE_RADIAL", 2, {500, 320, 240, 0.1}},
-                                            {"RADIAL", 3, {500, 320, 240, 0.1, -0.02}},
-                                            {"OPENCV", 4, {500, 510, 320, 240, 0.1, -0.02, 1e-3, 2e-3}},
-                                            {"FULL_OPENCV", 6, {500, 510, 320, 240, 0.1, 0, 0, 0, 0.01, 0, 0, 0}}};
+const std::vector<NumberedModel> kColmapModels = {
+    {"SIMPLE_PINHOLE", 0, {500, 320, 240}},
+    {"PINHOLE", 1, {500, 510, 320, 240}},
+    {"SIMPLE_RADIAL", 2, {500, 320, 240, 0.1}},
+    {"RADIAL", 3, {500, 320, 240, 0.1, -0.02}},
+    {"OPENCV", 4, {500, 510, 320, 240, 0.1, -0.02, 1e-3, 2e-3}},
+    {"FULL_OPENCV", 6, {500, 510, 320, 240, 0.1, 0, 0, 0, 0.01, 0, 0, 0}}};
 
 enum class PointLines { none, empty, points, missing };
 
 WrittenModel written_model(PointLines lines, const std::string& end_of_line = "\n") {
   WrittenModel model;
-  append(model.cameras_bin, std::uint64_t{kModels.size()});
-  append(model.images_bin, std::uint64_t{kModels.size()});
+  append(model.cameras_bin, std::uint64_t{kColmapModels.size()});
+  append(model.images_bin, std::uint64_t{kColmapModels.size()});
   RandomStream random(4, 4);
-  for (std::size_t i = 0; i < kModels.size(); ++i) {
+  for (std::size_t i = 0; i < kColmapModels.size(); ++i) {
     const auto id = static_cast<std::uint32_t>(10 * i + 1);
-    model.cameras_txt += fmt::format("{} {} 640 480", id, kModels[i].name);
+    model.cameras_txt += fmt::format("{} {} 640 480", id, kColmapModels[i].name);
     append(model.cameras_bin, id);
-    append(model.cameras_bin, kModels[i].number);
+    append(model.cameras_bin, kColmapModels[i].number);
     append(model.cameras_bin, std::uint64_t{640});
     append(model.cameras_bin, std::uint64_t{480});
-    for (const double p : kModels[i].parameters) {
+    for (const double p : kColmapModels[i].parameters) {
       model.cameras_txt += fmt::format(" {}", p);
       append(model.cameras_bin, p);
     }
@@ -125,7 +126,8 @@ WrittenModel written_model(PointLines lines, const std::string& end_of_line = "\
       append(model.images_bin, 2.5);
       append(model.images_bin, std::int64_t{-1});
     }
-    if (lines != PointLines::missing) model.images_txt += (points ? "1.5 2.5 -1 1.5 2.5 -1" : "") + end_of_line;
+    if (lines != PointLines::missing)
+      model.images_txt += (points ? "1.5 2.5 -1 1.5 2.5 -1" : "") + end_of_line;
   }
   return model;
 }
@@ -136,7 +138,8 @@ TEST(ColmapModels, AreTheSameInEveryForm) {
   ASSERT_EQ(expected.cameras_size(), 6);
   EXPECT_EQ(expected.cameras(3).camera_id(), "view 3");
   EXPECT_EQ(expected.cameras(5).calibration().k3(), 0.01);
-  for (const PointLines lines : {PointLines::none, PointLines::empty, PointLines::points, PointLines::missing}) {
+  for (const PointLines lines :
+       {PointLines::none, PointLines::empty, PointLines::points, PointLines::missing}) {
     for (const char* end_of_line : {"\n", "\r\n"}) {
       const WrittenModel model = written_model(lines, end_of_line);
       const auto text = value_of(parse_colmap(model.cameras_txt, model.images_txt, "model"));
@@ -150,7 +153,8 @@ TEST(ColmapModels, AreTheSameInEveryForm) {
 TEST(ColmapModels, BrokenOffAnywhereAreRefused) {
   const WrittenModel model = written_model(PointLines::points);
   for (std::size_t cut = 0; cut < model.cameras_bin.size(); ++cut)
-    EXPECT_FALSE(parse_colmap_binary(model.cameras_bin.substr(0, cut), model.images_bin, "model").ok()) << cut;
+    EXPECT_FALSE(parse_colmap_binary(model.cameras_bin.substr(0, cut), model.images_bin, "model").ok())
+        << cut;
   for (std::size_t cut = 0; cut < model.images_bin.size(); ++cut)
     EXPECT_THAT(parse_colmap_binary(model.cameras_bin, model.images_bin.substr(0, cut), "model"),
                 FailsWith("images.bin", "too early"))
@@ -182,19 +186,23 @@ TEST(ColmapModels, AreFoundWhereColmapPutsThem) {
   }
 }
 
-const std::string kMatrix = "camera_matrix: {rows: 3, cols: 3, data: [260, 0, 63.5, 0, 261, 47.5, 0, 0, 1]}\n";
-const std::string kSize = "image_width: 128\nimage_height: 96\n";
-const std::string kFour = "distortion_coefficients: {rows: 1, cols: 4, data: [0.03, 0.005, -0.002, 0.0004]}\n";
-const std::string kPose = "R: [0, 0, 0]\nT: [0.1, 0.2, 0.3]\n";
+const std::string kMatrixLine =
+    "camera_matrix: {rows: 3, cols: 3, data: [260, 0, 63.5, 0, 261, 47.5, 0, 0, 1]}\n";
+const std::string kSizeLines = "image_width: 128\nimage_height: 96\n";
+const std::string kFourLine =
+    "distortion_coefficients: {rows: 1, cols: 4, data: [0.03, 0.005, -0.002, 0.0004]}\n";
+const std::string kPoseLines = "R: [0, 0, 0]\nT: [0.1, 0.2, 0.3]\n";
 
 TEST(OpencvFiles, OtherLensesUnitsAndProgramsAreRefusedByName) {
-  const std::string usual = kSize + kMatrix + kFour;
+  const std::string usual = kSizeLines + kMatrixLine + kFourLine;
   const auto xml = [](const std::string& more) {
-    return "<opencv_storage><image_width>128</image_width><image_height>96</image_height><camera_matrix>260. 0. "
+    return "<opencv_storage><image_width>128</image_width><image_height>96</image_height><camera_matrix>260. "
+           "0. "
            "63.5 0. 260. 47.5 0. 0. 1.</camera_matrix><distortion_coefficients>0.03 0.005 -0.002 0.0004"
-           "</distortion_coefficients>" + more + "</opencv_storage>";
+           "</distortion_coefficients>" +
+           more + "</opencv_storage>";
   };
-  ASSERT_TRUE(parse_opencv(usual + kPose, "a", "a.yml").ok());
+  ASSERT_TRUE(parse_opencv(usual + kPoseLines, "a", "a.yml").ok());
   ASSERT_TRUE(parse_opencv(xml("<fisheye_model>0</fisheye_model>"), "a", "a.xml").ok());
   const std::pair<std::string, const char*> cases[] = {
       {usual + "distortion_model: equidistant\n", "\"equidistant\" isn't modelled: it is a fisheye"},
@@ -210,12 +218,13 @@ TEST(OpencvFiles, OtherLensesUnitsAndProgramsAreRefusedByName) {
       {usual + "xi: 1.2\n", "omnidirectional"},
       {usual + "skew: 0.3\n", "skewed"},
       {usual + "binning_x: 2\n", "binning"},
-      {kSize + kFour + "camera_matrix: [260, 0.5, 63.5, 0, 261, 47.5, 0, 0, 1]\n", "skewed pixels (0.5)"},
-      {kSize + kFour + "camera_matrix: [260, 0, 0, 0, 261, 0, 63.5, 47.5, 1]\n", "is not fx 0 cx"},
-      {kSize + kMatrix + "distortion_coefficients: [0, 0, 0, 0, 0, 0.1, 0, 0]\n", "at most k3"},
-      {kSize + kMatrix + "my_dist: [0.1, 0, 0, 0]\n", "my_dist"},
-      {usual + kPose + "unit: mm\n", "T is in mm"},
-      {usual + kPose + "square_size: 25.\n", "square_size"},
+      {kSizeLines + kFourLine + "camera_matrix: [260, 0.5, 63.5, 0, 261, 47.5, 0, 0, 1]\n",
+       "skewed pixels (0.5)"},
+      {kSizeLines + kFourLine + "camera_matrix: [260, 0, 0, 0, 261, 0, 63.5, 47.5, 1]\n", "is not fx 0 cx"},
+      {kSizeLines + kMatrixLine + "distortion_coefficients: [0, 0, 0, 0, 0, 0.1, 0, 0]\n", "at most k3"},
+      {kSizeLines + kMatrixLine + "my_dist: [0.1, 0, 0, 0]\n", "my_dist"},
+      {usual + kPoseLines + "unit: mm\n", "T is in mm"},
+      {usual + kPoseLines + "square_size: 25.\n", "square_size"},
       {usual + "R: [2, 0, 0, 0, 1, 0, 0, 0, 1]\nT: [0, 0, 0]\n", "R"},
       {"M1: [1]\nD1: [1]\n", "stereo pair by OpenCV"},
       {"R: [0, 0, 0]\nT: [0, 0, 0]\nR1: [1]\nQ: [1]\n", "rectification of a stereo pair"},
@@ -229,26 +238,28 @@ TEST(OpencvFiles, OtherLensesUnitsAndProgramsAreRefusedByName) {
   for (const auto& [text, what] : cases) {
     const auto camera = parse_opencv(text, "a", "a.yml");
     EXPECT_THAT(camera, FailsWith("a.yml", what)) << text;
-    if (!camera.ok()) EXPECT_FALSE(camera.error().remedy.empty());
+    EXPECT_TRUE(camera.ok() || !camera.error().remedy.empty()) << text;
   }
 }
 
 TEST(OpencvFiles, OtherNamesAreRead) {
-  const auto expected = value_of(parse_opencv(kSize + kMatrix + kFour, "a", "a.yml"));
+  const auto expected = value_of(parse_opencv(kSizeLines + kMatrixLine + kFourLine, "a", "a.yml"));
   const std::string texts[] = {
-      "image_Width: 128\nimage_Height: 96\nCamera_Matrix: {rows: 3, cols: 3, data: [260, 0, 63.5, 0, 261, 47.5, 0, "
+      "image_Width: 128\nimage_Height: 96\nCamera_Matrix: {rows: 3, cols: 3, data: [260, 0, 63.5, 0, 261, "
+      "47.5, 0, "
       "0, 1]}\nDistortion_Coefficients: [0.03, 0.005, -0.002, 0.0004, 0]\nsquare_Size: 50\nflagValue: 0\n",
       R"({"image_width": 128, "image_height": 96, "camera_matrix": [[260, 0, 63.5], [0, 261, 47.5], [0, 0, 1]],
           "dist_coeff": [[0.03, 0.005, -0.002, 0.0004, 0.0]]})",
-      kSize + kMatrix + kFour + "camera_name: left\ndistortion_model: plumb_bob\n",
-      kSize + kMatrix + kFour + "fisheye_model: 0\nflags: 0\nsquare_size: 25\nnframes: 12\n"};
+      kSizeLines + kMatrixLine + kFourLine + "camera_name: left\ndistortion_model: plumb_bob\n",
+      kSizeLines + kMatrixLine + kFourLine + "fisheye_model: 0\nflags: 0\nsquare_size: 25\nnframes: 12\n"};
   for (const std::string& text : texts) {
     ImportNotes notes;
-    EXPECT_EQ(value_of(parse_opencv(text, "a", "a.yml", &notes)).DebugString(), expected.DebugString()) << text;
+    EXPECT_EQ(value_of(parse_opencv(text, "a", "a.yml", &notes)).DebugString(), expected.DebugString())
+        << text;
     EXPECT_TRUE(notes.empty()) << testing::PrintToString(notes);
   }
   ImportNotes notes;
-  ASSERT_TRUE(parse_opencv(kSize + kMatrix + "shutter: rolling\n", "a", "a.yml", &notes).ok());
+  ASSERT_TRUE(parse_opencv(kSizeLines + kMatrixLine + "shutter: rolling\n", "a", "a.yml", &notes).ok());
   EXPECT_THAT(notes, testing::UnorderedElementsAre(HasSubstr("without distortion"), HasSubstr("shutter")));
 }
 
@@ -257,8 +268,9 @@ std::string kalibr_text(const std::string& distortion, double scale = 1) {
       "  camera_model: pinhole\n  distortion_model: {}\n  distortion_coeffs: [0.1, -0.02, 0.001, 0.002]\n"
       "  intrinsics: [260, 261, 63.5, 47.5]\n  resolution: [128, 96]\n  rostopic: /cam\n",
       distortion);
-  const std::string step = fmt::format(
-      "  T_cn_cnm1:\n  - [0, -1, 0, {}]\n  - [1, 0, 0, 0]\n  - [0, 0, 1, 0]\n  - [0, 0, 0, 1]\n", 0.5 * scale);
+  const std::string step =
+      fmt::format("  T_cn_cnm1:\n  - [0, -1, 0, {}]\n  - [1, 0, 0, 0]\n  - [0, 0, 1, 0]\n  - [0, 0, 0, 1]\n",
+                  0.5 * scale);
   return "cam0:\n" + lens + "cam1:\n" + lens + step + "cam2:\n" + lens + step;
 }
 
@@ -290,8 +302,7 @@ TEST(ForeignRigs, MillimetresAreRefusedInEveryFormat) {
   for (v1::RigCamera& camera : *rig.mutable_cameras()) {
     camera.mutable_calibration()->clear_sigma();
     for (const int i : {3, 7, 11})
-      camera.mutable_calibration()->set_camera_from_world(i,
-                                                          1e3 * camera.calibration().camera_from_world(i));
+      camera.mutable_calibration()->set_camera_from_world(i, 1e3 * camera.calibration().camera_from_world(i));
   }
   const test::TempFolder folder;
   ASSERT_TRUE(export_rig(rig, folder.path()).ok());
@@ -301,17 +312,20 @@ TEST(ForeignRigs, MillimetresAreRefusedInEveryFormat) {
 
 TEST(ForeignRigs, FilesAreKnownByWhatTheyHold) {
   const test::TempFolder folder;
-  const std::pair<const char*, std::string> read[] = {{"camera (1).YML", kSize + kMatrix + kFour},
-                                                      {"ros.YAML", kSize + kMatrix + kFour},
-                                                      {"python.json", R"({"image_width": 128, "image_height": 96,
+  const std::pair<const char*, std::string> read[] = {
+      {"camera (1).YML", kSizeLines + kMatrixLine + kFourLine},
+      {"ros.YAML", kSizeLines + kMatrixLine + kFourLine},
+      {"python.json", R"({"image_width": 128, "image_height": 96,
           "camera_matrix": [[260, 0, 63.5], [0, 261, 47.5], [0, 0, 1]], "dist_coeff": [[0.03, 0.005, 0, 0, 0]]})"}};
   for (const auto& [name, text] : read) {
     std::ofstream(folder / name) << text;
     EXPECT_TRUE(import_rig(folder / name).ok()) << name;
   }
-  const std::pair<const char*, std::string> refused[] = {
-      {"calibration.toml", "[cam_0]\nname = 'x'\n"}, {"ost.ini", "[image]\n\nwidth\n640\n"}, {"empty.json", ""},
-      {"list.json", "[1, 2]"},                       {"other.json", R"({"views": []})"}};
+  const std::pair<const char*, std::string> refused[] = {{"calibration.toml", "[cam_0]\nname = 'x'\n"},
+                                                         {"ost.ini", "[image]\n\nwidth\n640\n"},
+                                                         {"empty.json", ""},
+                                                         {"list.json", "[1, 2]"},
+                                                         {"other.json", R"({"views": []})"}};
   for (const auto& [name, text] : refused) {
     std::ofstream(folder / name) << text;
     const auto rig = import_rig(folder / name);

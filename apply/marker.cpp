@@ -85,12 +85,19 @@ std::vector<MarkerPoint> find_marker(const ImageView& picture, const Marker& mar
   const double half = marker.edge.value() / 2;
   const std::array<Eigen::Vector3d, 4> corners = {
       {{-half, half, 0}, {half, half, 0}, {half, -half, 0}, {-half, -half, 0}}};
-  for (const recon::SeenMarker& seen : recon::find_markers(picture, marker.dictionary, lens, light)) {
-    if (seen.id != marker.id) continue;
-    if (!points.empty()) return {};  // two of one number tell no pose
-    for (std::size_t c = 0; c < 4; ++c) points.push_back({corners[c], seen.corners[c]});
+  for (const recon::MarkerInk ink : {recon::MarkerInk::dark, recon::MarkerInk::light}) {
+    for (const recon::SeenMarker& seen : recon::find_markers(picture, marker.dictionary, lens, light, ink)) {
+      if (seen.id != marker.id) continue;
+      if (!points.empty()) return {};  // two of one number tell no pose
+      for (std::size_t c = 0; c < 4; ++c) points.push_back({corners[c], seen.corners[c]});
+    }
+    if (!points.empty()) break;
   }
   return points;
+}
+
+bool is_mirrored(const ImageView& picture, const Marker& marker, const recon::Intrinsics& lens) {
+  return !find_marker(recon::mirror_picture(picture).view(), marker, lens).empty();
 }
 
 std::string other_markers(const ImageView& picture, const recon::Intrinsics& lens) {

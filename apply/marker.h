@@ -41,11 +41,14 @@ struct MarkerPoint {
   Eigen::Vector3d place;
   Eigen::Vector2d pixel;
 };
-/// Its four corners, or those of the board's that are seen; empty where it isn't seen. `light`: see
-/// recon::find_markers().
+/// Its four corners, or those of the board's that are seen; empty where it isn't seen. It may be printed
+/// white on black. `light`: see recon::find_markers().
 std::vector<MarkerPoint> find_marker(const ImageView& picture, const Marker& marker,
                                      const recon::Intrinsics& lens,
                                      const std::array<float, 256>* light = nullptr);
+
+/// Whether a picture shows it only in its mirror image, where find_marker() doesn't see it.
+bool is_mirrored(const ImageView& picture, const Marker& marker, const recon::Intrinsics& lens);
 
 /// What a picture shows instead: "markers of 5X5_50, numbers 3 and 4", by the first of OpenCV's dictionaries
 /// of which most are seen; empty where it shows no markers at all.

@@ -25,7 +25,7 @@
 #include "cli/interrupt.h"
 #include "cli/numbers.h"
 #include "cli/outputs.h"
-#include "recon/calibrate/rig_formats.h"
+#include "cli/rig_argument.h"
 
 namespace emberlock::cli {
 namespace {
@@ -68,7 +68,7 @@ Result<recon::Intrinsics> lens_of(const ArArguments& a, ImageSize size) {
       return Error{ErrorKind::bad_input, "is out of range", "--focal", "Give the focal length in pixels"};
     return recon::Intrinsics{size, *a.focal, *a.focal, size.width / 2.0, size.height / 2.0, {}};
   }
-  EMBERLOCK_ASSIGN_OR_RETURN(const v1::Rig rig, recon::import_rig(a.rig));
+  EMBERLOCK_ASSIGN_OR_RETURN(const v1::Rig rig, import_rig_argument(a.rig));
   std::string all;
   for (const v1::RigCamera& camera : rig.cameras()) {
     all += (all.empty() ? "" : ", ") + camera.camera_id();

@@ -21,6 +21,11 @@ constexpr std::size_t kLookedAt = 8;
 
 Error nowhere(const ArFilm& film, const apply::Marker& marker, const recon::Intrinsics& lens,
               const std::vector<Image>& some) {
+  for (const Image& frame : some)
+    if (apply::is_mirrored(frame.view(), marker, lens))
+      return {ErrorKind::bad_input,
+              fmt::format("its frames show {} only in their mirror images", apply::marker_words(marker)),
+              film.name(), "Switch the mirroring off that the camera's driver or program does"};
   for (const Image& frame : some) {
     const std::string others = apply::other_markers(frame.view(), lens);
     if (!others.empty())

@@ -15,6 +15,7 @@
 #include "cli/board_options.h"
 #include "cli/commands.h"
 #include "cli/outputs.h"
+#include "cli/rig_argument.h"
 #include "cli/scene_options.h"
 #include "films/board_search.h"
 #include "recon/calibrate/calibrate_rig.h"
@@ -180,14 +181,15 @@ void add_convert(const Verb& parent) {
   auto arguments = std::make_shared<Arguments>();
   const Verb verb = parent.add_verb(
       "convert", "Converts another program's calibration to rig.json, and rig.json for other programs");
-  verb.add_option("rig", arguments->rig,
-                  "rig.json, transforms.json, OpenCV's YAML or XML (a file, or a folder of them), or a "
-                  "folder of COLMAP's text files")
+  verb.add_option(
+          "rig", arguments->rig,
+          "rig.json, transforms.json, OpenCV's or ROS' YAML, XML or JSON (a file, or a folder of them), "
+          "Kalibr's camchain, or a folder with COLMAP's model (also in sparse/0)")
       .require();
   verb.add_option("--out", arguments->out, "Folder for rig.json, transforms.json, opencv/ and colmap/")
       .require();
   verb.set_action([arguments] {
-    const v1::Rig rig = or_fail(recon::import_rig(arguments->rig));
+    const v1::Rig rig = or_fail(import_rig_argument(arguments->rig));
     OutputFolder staging =
         or_fail(OutputFolder::create({arguments->out, kCalibrateConvert, {arguments->rig}}));
     or_fail(recon::export_rig(rig, staging.path()));

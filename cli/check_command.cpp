@@ -9,9 +9,9 @@
 
 #include "cli/board_options.h"
 #include "cli/commands.h"
+#include "cli/rig_argument.h"
 #include "films/board_search.h"
 #include "recon/calibrate/drift.h"
-#include "recon/calibrate/rig_formats.h"
 
 namespace emberlock::cli {
 namespace {
@@ -97,7 +97,7 @@ struct CheckArguments {
 };
 
 void check(const CheckArguments& arguments) {
-  const v1::Rig rig = or_fail(recon::import_rig(arguments.rig));
+  const v1::Rig rig = or_fail(import_rig_argument(arguments.rig));
   const recon::BoardSearch search =
       arguments.lamp ? films::search_for_lamp()
                      : recon::search_for(or_fail(recon::parse_board(arguments.boards.board)));

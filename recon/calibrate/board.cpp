@@ -210,7 +210,13 @@ Board lamp_as_board() { return {.kind = BoardKind::lamp, .columns = 1, .rows = 1
 std::string noun_of(const Board& board) { return board.kind == BoardKind::lamp ? "lamp" : "board"; }
 
 BoardSearch search_for(const Board& board) {
-  return {board, [board](const ImageView& picture) { return find_board(picture, board); }};
+  BoardSearch search{board, [board](const ImageView& picture) { return find_board(picture, board); }};
+  if (board.kind == BoardKind::charuco) {
+    search.find_mirrored = [board](const ImageView& picture) {
+      return !find_board(mirror_picture(picture).view(), board).empty();
+    };
+  }
+  return search;
 }
 
 std::string board_words(const Board& board) {
@@ -232,12 +238,18 @@ std::string board_words(const Board& board) {
 std::vector<BoardCorner> find_board(const ImageView& picture, const Board& board) {
   const cv::Mat grey = grey_of(picture);
   if (std::min(grey.cols, grey.rows) < 16) return {};
-  std::vector<BoardCorner> corners =
-      board.kind == BoardKind::chessboard ? find_chessboard(grey, board) : find_charuco(grey, board);
-  const bool enough = corners.size() >= std::min(static_cast<std::size_t>(kFewestCorners),
-                                                 static_cast<std::size_t>(board.corners()));
-  if (!enough || !spans_a_plane(corners, board)) return {};
-  return corners;
+  const auto usable = [&](std::vector<BoardCorner> corners) {
+    const bool enough = corners.size() >= std::min(static_cast<std::size_t>(kFewestCorners),
+                                                   static_cast<std::size_t>(board.corners()));
+    if (!enough || !spans_a_plane(corners, board)) corners.clear();
+    return corners;
+  };
+  if (board.kind == BoardKind::chessboard) return usable(find_chessboard(grey, board));
+  std::vector<BoardCorner> corners = usable(find_charuco(grey, board));
+  if (!corners.empty()) return corners;
+  cv::Mat negative;
+  cv::bitwise_not(grey, negative);
+  return usable(find_charuco(negative, board));
 }
 
 Image draw_board(const Board& board, int square) {

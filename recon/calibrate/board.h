@@ -62,15 +62,17 @@ struct BoardCorner {
 };
 
 /// Finds the corners of a board (not of a lamp, for which smear_sync has a detector) in a picture of any
-/// format, with subpixel accuracy. Empty if it isn't visible, or too little of it (fewer than 6 corners, or
-/// all on one line). If a chessboard isn't ambiguous(), its corners are numbered the same from every side:
-/// the first is the one whose inner square is black.
+/// format, with subpixel accuracy. A ChArUco board may be printed white on black. Empty if it isn't visible,
+/// or too little of it (fewer than 6 corners, or all on one line). If a chessboard isn't ambiguous(), its
+/// corners are numbered the same from every side: the first is the one whose inner square is black.
 std::vector<BoardCorner> find_board(const ImageView& picture, const Board& board);
 
 /// The board to search for, and the method.
 struct BoardSearch {
   Board board;
   std::function<std::vector<BoardCorner>(const ImageView& picture)> find;  ///< called by several threads
+  /// Whether a picture shows the board as a mirror image. Empty if a mirrored board is one too.
+  std::function<bool(const ImageView& picture)> find_mirrored = {};
 };
 /// A search with find_board().
 BoardSearch search_for(const Board& board);

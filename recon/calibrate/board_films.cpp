@@ -14,6 +14,7 @@
 namespace emberlock::recon {
 namespace {
 
+constexpr std::size_t kMirrorLooks = 16;   // frames of a film that are searched for a mirrored board
 constexpr double kLeastDifference = 0.01;  // of the picture's diagonal
 
 /// The frames and corners of one camera at the searched instants.
@@ -25,6 +26,7 @@ struct CameraFilm {
     double motion = 0;  ///< pixels per frame; infinite if the neighbouring frame doesn't show the board
   };
   std::vector<Look> seen;
+  std::optional<std::size_t> mirrored;  ///< a frame that shows the board only in its mirror image
   std::vector<BoardReading::Unused> unreadable;
   std::size_t readable = 0;
 };
@@ -91,7 +93,14 @@ Status search_film(session::SessionReader& reader, std::size_t camera, const Boa
       continue;
     }
     ++film.readable;
-    if (corners->empty()) continue;
+    if (corners->empty()) {
+      const bool sample = look % std::max<std::size_t>(1, film.frames.size() / kMirrorLooks) == 0;
+      if (sample && film.seen.empty() && !film.mirrored && search.find_mirrored) {
+        const auto read = reader.read(camera, frame);
+        if (read && search.find_mirrored(read->image->view())) film.mirrored = frame;
+      }
+      continue;
+    }
     double motion = options.stillness > 0 ? INFINITY : 0;
     if (options.stillness > 0 && count > 1) {
       const auto beside = corners_in(frame + 1 < count ? frame + 1 : frame - 1);
@@ -133,6 +142,10 @@ Status nothing_found(const std::filesystem::path& folder, const BoardReading& re
                      const FilmSearchOptions& options, double slowest) {
   const FilmCounts& film = *reading.film;
   const std::string noun = noun_of(reading.sightings.board);
+  const auto mirrored = std::find_if(reading.unused.begin(), reading.unused.end(),
+                                     [](const auto& unused) { return unused.why == kMirroredBoard; });
+  if (film.seen == 0 && mirrored != reading.unused.end())
+    return Error{ErrorKind::bad_input, kMirroredBoard, mirrored->path.string(), kSwitchMirroringOff};
   if (film.seen == 0) {
     return Error{
         ErrorKind::bad_input,
@@ -257,6 +270,9 @@ Result<BoardReading> find_boards_in_session(const std::filesystem::path& folder,
         {stream.camera_id(), {static_cast<int>(stream.width()), static_cast<int>(stream.height())}});
     readable += films[c].readable;
     for (BoardReading::Unused& unused : films[c].unreadable) reading.unused.push_back(std::move(unused));
+    if (films[c].seen.empty() && films[c].mirrored)
+      reading.unused.push_back(
+          {folder / stream.camera_id() / ("frame " + std::to_string(*films[c].mirrored)), kMirroredBoard});
     for (CameraFilm::Look& look : films[c].seen) {
       if (motions[look.look] > options.stillness) continue;
       reading.sightings.sightings.push_back(

@@ -68,6 +68,7 @@ struct Found {
   ImageSize size;
   std::vector<BoardCorner> corners;
   std::string unreadable;  ///< the reason
+  bool mirrored = false;   ///< the board is only in the mirror image
 };
 
 std::vector<Found> find_in_all(const std::vector<BoardPicture>& pictures, const BoardSearch& search,
@@ -83,6 +84,8 @@ std::vector<Found> find_in_all(const std::vector<BoardPicture>& pictures, const 
     if (picture) {
       found[i].size = picture->layout().size;
       found[i].corners = search.find(picture->view());
+      found[i].mirrored =
+          found[i].corners.empty() && search.find_mirrored && search.find_mirrored(picture->view());
     } else {
       found[i].unreadable = picture.error().what;
     }
@@ -137,6 +140,7 @@ Result<BoardReading> find_boards(const std::vector<BoardPicture>& pictures, cons
     reading.sightings.instants.push_back(name);
   }
   std::map<std::string, const BoardPicture*> first_of;
+  const BoardPicture* mirrored = nullptr;
   for (std::size_t i = 0; i < pictures.size(); ++i) {
     const BoardPicture& picture = pictures[i];
     if (!found[i].unreadable.empty()) {
@@ -161,7 +165,10 @@ Result<BoardReading> find_boards(const std::vector<BoardPicture>& pictures, cons
                           "Calibrate a camera with pictures of one size: that which it records");
     }
     if (found[i].corners.empty()) {
-      reading.unused.push_back({picture.path, "the " + noun_of(search.board) + " wasn't found"});
+      reading.unused.push_back({picture.path, found[i].mirrored
+                                                  ? kMirroredBoard
+                                                  : "the " + noun_of(search.board) + " wasn't found"});
+      mirrored = found[i].mirrored && !mirrored ? &picture : mirrored;
       continue;
     }
     reading.sightings.sightings.push_back(
@@ -172,6 +179,8 @@ Result<BoardReading> find_boards(const std::vector<BoardPicture>& pictures, cons
                         "can't be read, nor any other picture: " + reading.unused[0].why,
                         "Give PNG, PGM, PPM, TIFF or JPEG pictures");
   }
+  if (reading.sightings.sightings.empty() && mirrored)
+    return bad_pictures(mirrored->path.string(), kMirroredBoard, kSwitchMirroringOff);
   return reading;
 }
 

@@ -11,6 +11,10 @@
 
 namespace emberlock::recon {
 
+inline constexpr const char* kMirroredBoard = "shows the board only in its mirror image";
+inline constexpr const char* kSwitchMirroringOff =
+    "Switch the mirroring off that the camera's driver or program does";
+
 /// A picture of the board, with its camera and instant.
 struct BoardPicture {
   std::string camera;

@@ -60,6 +60,11 @@ enum class Weigh { by_noise, by_inflated_noise };
 bool holds_lens(Held held) { return held == Held::lens || held == Held::both; }
 bool holds_pose(Held held) { return held == Held::pose || held == Held::both; }
 
+/// The lens's unknowns that are fixed.
+std::vector<int> fixed_unknowns(const BundleCamera& camera) {
+  return {kRadialUnknowns.begin() + camera.radial_terms, kRadialUnknowns.end()};
+}
+
 CornerEquations corner_equations(const Bundle& bundle, const BundleView& view, std::size_t i, double weight) {
   return {&bundle.cameras[view.camera].model.camera_from_world.rotation,
           &bundle.boards[view.board].world_from_board.rotation, bundle.board.point(view.corners[i].id),
@@ -141,8 +146,8 @@ std::unique_ptr<ceres::Problem> problem_of(const Bundle& bundle, Blocks& blocks,
     }
     if (holds_lens(held)) {
       problem->SetParameterBlockConstant(blocks.lenses[i].data());
-    } else if (bundle.cameras[i].k3 == ThirdRadial::held) {
-      problem->SetManifold(blocks.lenses[i].data(), new ceres::SubsetManifold(kLensUnknowns, {8}));
+    } else if (const std::vector<int> fixed = fixed_unknowns(bundle.cameras[i]); !fixed.empty()) {
+      problem->SetManifold(blocks.lenses[i].data(), new ceres::SubsetManifold(kLensUnknowns, fixed));
     }
   }
   for (std::size_t i = 0; i < bundle.boards.size(); ++i) {
@@ -277,14 +282,18 @@ std::optional<Eigen::MatrixXd> covariance(const Bundle& bundle) {
 double jackknife_inflation(const Bundle& bundle) {
   const BundleCamera& camera = bundle.cameras.front();
   const Blocks blocks(bundle);
-  const Eigen::Index unknowns = camera.k3 == ThirdRadial::free ? kLensUnknowns : kLensUnknowns - 1;
+  const std::vector<int> fixed = fixed_unknowns(camera);
+  std::vector<Eigen::Index> free;
+  for (int i = 0; i < kLensUnknowns; ++i)
+    if (std::find(fixed.begin(), fixed.end(), i) == fixed.end()) free.push_back(i);
+  const auto unknowns = static_cast<Eigen::Index>(free.size());
   std::vector<Eigen::MatrixXd> normals;  // of each view, with its board's pose eliminated
   std::vector<Eigen::VectorXd> gradients;
   Eigen::MatrixXd all = Eigen::MatrixXd::Zero(unknowns, unknowns);
   for (const BundleView& view : bundle.views) {
     if (view.used() < kFewestForPose) continue;
     const ViewEquations equations = equations_of(bundle, view, blocks);
-    const Eigen::MatrixXd lens = equations.lens.leftCols(unknowns);
+    const Eigen::MatrixXd lens = equations.lens(Eigen::all, free);
     const Eigen::HouseholderQR<Eigen::MatrixXd> pose(equations.board);
     const Eigen::MatrixXd kept = pose.householderQ() * Eigen::MatrixXd::Identity(lens.rows(), kPoseUnknowns);
     const Eigen::MatrixXd across = lens - kept * (kept.transpose() * lens);

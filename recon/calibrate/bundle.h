@@ -37,15 +37,15 @@ struct PosePrior {
   Eigen::Matrix<double, kPoseUnknowns, kPoseUnknowns> covariance;
 };
 
-enum class ThirdRadial {
-  held,  ///< k3 is fixed
-  free,
-};
+inline constexpr int kRadialTerms = 3;       ///< k1, k2, k3
+inline constexpr int kUsualRadialTerms = 2;  ///< k1, k2
+/// The place of each among a lens's unknowns.
+inline constexpr std::array kRadialUnknowns = {4, 5, 8};
 
 struct BundleCamera {
   CameraModel model;
   Held held = Held::none;
-  ThirdRadial k3 = ThirdRadial::held;
+  int radial_terms = kUsualRadialTerms;  ///< k1, k2, k3: the first ones are free, the others fixed
   /// Standard deviation of a corner's coordinate in pixels, for weighting its residuals.
   double noise = 1;
   double inflation = 1;  ///< factor on the standard deviations, because the corners of a view have correlated

@@ -12,6 +12,7 @@
 #include <fmt/format.h>
 
 #include "recon/calibrate/chain_poses.h"
+#include "recon/calibrate/judge_rig.h"
 #include "recon/calibrate/lens_start.h"
 #include "recon/calibrate/pose.h"
 
@@ -291,11 +292,58 @@ void tell_cameras(const BoardSightings& sightings, RigCalibration& result) {
     camera.corners_used += view.used();
   }
   for (CalibratedCamera& camera : result.cameras) {
-    if (!camera.calibrated || camera.placed) continue;
+    if (!camera.calibrated || camera.placed || !camera.why.empty()) continue;
     camera.why =
         "shares no usable instant of the board with the other cameras. Take pictures in which it and a "
         "connected "
         "camera see the board at once";
+  }
+}
+
+/// Solves the largest group, with its covariance in the world's frame.
+Status solve_group(const BoardSightings& sightings, const CalibrateOptions& options, const Starts& starts,
+                   const std::vector<PlacedSighting>& placed, RigCalibration& result) {
+  EMBERLOCK_RETURN_IF_ERROR(adjust_group(sightings, options, starts, placed, result));
+  EMBERLOCK_ASSIGN_OR_RETURN(const std::size_t world, world_board(sightings, options, result));
+  result.world = sightings.instants[used_boards(sightings, result)[world].instant];
+  move_world(result.bundle, world);
+  EMBERLOCK_RETURN_IF_ERROR(adjust(result.bundle, BundleLoss::squares));
+  auto spread = covariance(result.bundle);
+  if (!spread) {
+    return Error{ErrorKind::bad_input, "the views don't determine all cameras", "cameras",
+                 "Take more pictures in which neighbouring cameras see the board at once, tilted"};
+  }
+  result.covariance = *std::move(spread);
+  return {};
+}
+
+/// Fixes radial coefficients of the cameras whose lens folds the picture in the common solution; true if
+/// there is one.
+bool hold_folding_lenses(const RigCalibration& result, Starts& starts) {
+  bool held = false;
+  for (std::size_t b = 0; b < result.bundle_camera.size(); ++b) {
+    if (distortion_inverts(result.bundle.cameras[b].model.intrinsics)) continue;
+    BundleCamera& camera = starts.of[result.bundle_camera[b]]->bundle.cameras[0];
+    held = hold_radial_term(camera) || held;
+  }
+  return held;
+}
+
+/// Solves the largest group of cameras that fit each other. The others are named and left out.
+Status solve_fitting(const BoardSightings& sightings, const CalibrateOptions& options, Starts& starts,
+                     std::vector<PlacedSighting> placed, RigCalibration& result) {
+  const auto rejected = result.rejected;
+  for (;;) {
+    EMBERLOCK_RETURN_IF_ERROR(solve_group(sightings, options, starts, placed, result));
+    const std::vector<Misfit> misfits = find_misfits(sightings, starts.lenses, placed, result);
+    for (const Misfit& misfit : misfits) {
+      CalibratedCamera& camera = result.cameras[misfit.camera];
+      camera.calibrated = !misfit.mirrored;
+      camera.why = misfit.why;
+      std::erase_if(placed, [&](const PlacedSighting& view) { return view.camera == misfit.camera; });
+    }
+    if (misfits.empty() && !hold_folding_lenses(result, starts)) return {};
+    result.rejected = rejected;  // another group may need them
   }
 }
 
@@ -321,25 +369,15 @@ Result<RigCalibration> calibrate_rig(const BoardSightings& sightings, const Cali
   }
   RigCalibration result;
   for (const auto& camera : sightings.cameras) result.cameras.push_back({.id = camera.id});
-  const Starts starts = start_lenses(sightings, options, progress, result);
-  const std::vector<PlacedSighting> placed = usable(sightings, starts, result);
+  Starts starts = start_lenses(sightings, options, progress, result);
+  std::vector<PlacedSighting> placed = usable(sightings, starts, result);
   if (placed.empty()) {
     return Error{ErrorKind::bad_input, result.cameras.front().why, "camera " + result.cameras.front().id,
                  sightings.cameras.size() > 1 ? "No other camera could be calibrated either" : ""};
   }
   tell(progress, 0.1 * kLensSteps, "all cameras together");
-  EMBERLOCK_RETURN_IF_ERROR(adjust_group(sightings, options, starts, placed, result));
-  EMBERLOCK_ASSIGN_OR_RETURN(const std::size_t world, world_board(sightings, options, result));
-  result.world = sightings.instants[used_boards(sightings, result)[world].instant];
-  move_world(result.bundle, world);
-  EMBERLOCK_RETURN_IF_ERROR(adjust(result.bundle, BundleLoss::squares));
+  EMBERLOCK_RETURN_IF_ERROR(solve_fitting(sightings, options, starts, std::move(placed), result));
   tell(progress, 0.95, "uncertainties");
-  auto spread = covariance(result.bundle);
-  if (!spread) {
-    return Error{ErrorKind::bad_input, "the views don't determine all cameras", "cameras",
-                 "Take more pictures in which neighbouring cameras see the board at once, tilted"};
-  }
-  result.covariance = *std::move(spread);
   tell_cameras(sightings, result);
   result.pairs = pairs_of(result);
   result.box = options.box ? options.box : common_box(result.bundle);

@@ -36,25 +36,6 @@ double angle_between(const Eigen::Matrix3d& a, const Eigen::Matrix3d& b) {
   return std::acos(std::clamp(0.5 * ((a.transpose() * b).trace() - 1), -1.0, 1.0));
 }
 
-/// The pose with the smallest sum of distances to the others; a radian counts like the length of the
-/// translations.
-Rigid3 medoid(const std::vector<Rigid3>& poses) {
-  double best = INFINITY;
-  std::size_t chosen = 0;
-  for (std::size_t i = 0; i < poses.size(); ++i) {
-    double sum = 0;
-    for (const Rigid3& other : poses) {
-      sum += (poses[i].translation - other.translation).norm() +
-             other.translation.norm() * angle_between(poses[i].rotation, other.rotation);
-    }
-    if (sum < best) {
-      best = sum;
-      chosen = i;
-    }
-  }
-  return poses[chosen];
-}
-
 /// Sum of the distances between projected and observed corners at an instant, for a board at
 /// `world_from_board`.
 double misfit(const BoardSightings& sightings, const std::vector<Intrinsics>& lenses, const Sightings& seen,
@@ -74,6 +55,23 @@ double misfit(const BoardSightings& sightings, const std::vector<Intrinsics>& le
 }
 
 }  // namespace
+
+Rigid3 medoid(const std::vector<Rigid3>& poses) {
+  double best = INFINITY;
+  std::size_t chosen = 0;
+  for (std::size_t i = 0; i < poses.size(); ++i) {
+    double sum = 0;
+    for (const Rigid3& other : poses) {
+      sum += (poses[i].translation - other.translation).norm() +
+             other.translation.norm() * angle_between(poses[i].rotation, other.rotation);
+    }
+    if (sum < best) {
+      best = sum;
+      chosen = i;
+    }
+  }
+  return poses[chosen];
+}
 
 Rigid3 chained(const Rigid3& outer, const Rigid3& inner) {
   return {outer.rotation * inner.rotation, outer * inner.translation};

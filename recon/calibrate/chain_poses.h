@@ -31,6 +31,10 @@ struct ChainPoses {
 ChainPoses chain_poses(const BoardSightings& sightings, const std::vector<Intrinsics>& lenses,
                        const std::vector<PlacedSighting>& placed, const std::vector<std::size_t>& group);
 
+/// The pose with the smallest sum of distances to the others; a radian counts like the length of the
+/// translations. `poses` isn't empty.
+Rigid3 medoid(const std::vector<Rigid3>& poses);
+
 /// b_from_a * a_from_world.
 Rigid3 chained(const Rigid3& outer, const Rigid3& inner);
 

@@ -3,17 +3,15 @@
 #include <array>
 #include <charconv>
 #include <cmath>
-#include <filesystem>
-#include <map>
 #include <optional>
 
 #include <Eigen/Geometry>
 #include <fmt/format.h>
 
+#include "recon/calibrate/colmap_model.h"
 #include "recon/calibrate/rig_formats.h"
 
 namespace emberlock::recon {
-namespace fs = std::filesystem;
 namespace {
 
 Error bad_colmap(std::string where, std::string what, std::string remedy) {
@@ -54,96 +52,45 @@ std::optional<double> number_of(std::string_view word) {
   return value;
 }
 
-/// The number of a model's parameters, and their indices for Distortion and focal lengths.
-struct ColmapModel {
-  const char* name;
-  std::size_t parameters;
-};
-constexpr std::array<ColmapModel, 6> kColmapModels = {{{"SIMPLE_PINHOLE", 3},
-                                                       {"PINHOLE", 4},
-                                                       {"SIMPLE_RADIAL", 4},
-                                                       {"RADIAL", 5},
-                                                       {"OPENCV", 8},
-                                                       {"FULL_OPENCV", 12}}};
-
-Result<Intrinsics> colmap_lens(const Line& line, const std::string& where) {
+Result<ColmapCamera> camera_of_line(const Line& line, const std::string& where) {
   const std::string place = where + "/cameras.txt, line " + std::to_string(line.number);
   const auto words = words_of_line(line.text);
   if (words.size() < 4)
     return bad_colmap(place, "is no camera", "Write CAMERA_ID MODEL WIDTH HEIGHT PARAMETERS");
-  const auto* model = std::find_if(kColmapModels.begin(), kColmapModels.end(),
-                                   [&](const ColmapModel& m) { return words[1] == m.name; });
-  if (model == kColmapModels.end()) {
-    return bad_colmap(place, "the camera model " + std::string(words[1]) + " isn't known",
-                      "Export it as OPENCV, FULL_OPENCV, RADIAL, SIMPLE_RADIAL, PINHOLE or SIMPLE_PINHOLE");
-  }
-  std::vector<double> p;
+  ColmapCamera camera{place, std::string(words[0]), std::string(words[1]), {}};
   for (std::size_t i = 2; i < words.size(); ++i) {
     const auto number = number_of(words[i]);
     if (!number) return bad_colmap(place, "\"" + std::string(words[i]) + "\" is no number", "Correct it");
-    p.push_back(*number);
+    camera.numbers.push_back(*number);
   }
-  if (p.size() != 2 + model->parameters) {
-    return bad_colmap(place, "has " + std::to_string(p.size() - 2) + " parameters",
-                      std::string(model->name) + " has " + std::to_string(model->parameters));
-  }
-  if (!(p[0] >= 1 && p[1] >= 1 && p[0] <= 65536 && p[1] <= 65536))
-    return bad_colmap(place, "width or height is out of range", "Give pixels");
-  Intrinsics lens;
-  lens.size = {static_cast<int>(p[0]), static_cast<int>(p[1])};
-  const bool one_focal = model->name == std::string_view("SIMPLE_PINHOLE") ||
-                         model->name == std::string_view("SIMPLE_RADIAL") ||
-                         model->name == std::string_view("RADIAL");
-  std::size_t at = 2;
-  lens.fx = p[at++];
-  lens.fy = one_focal ? lens.fx : p[at++];
-  lens.cx = p[at++];
-  lens.cy = p[at++];
-  Distortion& d = lens.distortion;
-  if (at < p.size()) d.k1 = p[at++];
-  if (at < p.size()) d.k2 = p[at++];
-  if (at < p.size()) d.p1 = p[at++];
-  if (at < p.size()) d.p2 = p[at++];
-  if (at < p.size()) d.k3 = p[at++];
-  if (std::any_of(p.begin() + static_cast<std::ptrdiff_t>(at), p.end(), [](double k) { return k != 0; }))
-    return bad_colmap(place, "k4, k5 and k6 aren't modelled",
-                      "Calibrate it as OPENCV, or export with k4 = k5 = k6 = 0");
-  return lens;
+  return camera;
 }
 
-struct ColmapImage {
-  std::string camera;  ///< CAMERA_ID
-  std::string name;
-  Rigid3 camera_from_world;
-};
-
-Result<ColmapImage> colmap_image(const Line& line, const std::string& where) {
-  const std::string place = where + "/images.txt, line " + std::to_string(line.number);
+Result<ColmapImage> image_of_line(const Line& line, const std::string& where) {
+  ColmapImage image;
+  image.where = where + "/images.txt, line " + std::to_string(line.number);
   const auto words = words_of_line(line.text);
   if (words.size() < 10)
-    return bad_colmap(place, "is no image", "Write IMAGE_ID QW QX QY QZ TX TY TZ CAMERA_ID NAME");
-  std::array<double, 7> p{};
-  for (std::size_t i = 0; i < p.size(); ++i) {
+    return bad_colmap(image.where, "is no image", "Write IMAGE_ID QW QX QY QZ TX TY TZ CAMERA_ID NAME");
+  for (std::size_t i = 0; i < image.pose.size(); ++i) {
     const auto number = number_of(words[i + 1]);
-    if (!number) return bad_colmap(place, "\"" + std::string(words[i + 1]) + "\" is no number", "Correct it");
-    p[i] = *number;
+    if (!number)
+      return bad_colmap(image.where, "\"" + std::string(words[i + 1]) + "\" is no number", "Correct it");
+    image.pose[i] = *number;
   }
-  const Eigen::Quaterniond q(p[0], p[1], p[2], p[3]);
-  if (!(std::abs(q.norm() - 1) < 0.01))
-    return bad_colmap(place, "the quaternion isn't of length 1", "Write QW QX QY QZ of a rotation");
-  ColmapImage image;
   image.camera = words[8];
   image.name = line.text.substr(static_cast<std::size_t>(words[9].data() - line.text.data()));
   while (!image.name.empty() && (image.name.back() == '\r' || image.name.back() == ' '))
     image.name.pop_back();
-  image.camera_from_world = {q.normalized().toRotationMatrix(), {p[4], p[5], p[6]}};
   return image;
 }
 
-/// One camera per image: named after its folder, else its name without extension.
-std::string camera_of_name(const std::string& name) {
-  const fs::path path(name);
-  return path.has_parent_path() ? path.begin()->string() : path.stem().string();
+/// Whether a line holds an image's points, X Y POINT3D_ID each, or none. Some programs leave these lines out.
+bool is_line_of_points(const Line& line) {
+  const auto words = words_of_line(line.text);
+  return words.size() % 3 == 0 && std::all_of(words.begin(), words.end(), [](std::string_view word) {
+           return number_of(word).has_value();
+         });
 }
 
 /// Prints numbers so that they are read back as the same double.
@@ -156,28 +103,22 @@ std::string joined(const Numbers& numbers) {
 
 }  // namespace
 
-Result<v1::Rig> parse_colmap(std::string_view cameras, std::string_view images, const std::string& where) {
-  std::map<std::string, Intrinsics, std::less<>> lenses;
+Result<v1::Rig> parse_colmap(std::string_view cameras, std::string_view images, const std::string& where,
+                             ImportNotes* notes) {
+  ColmapModel model;
   for (const Line& line : lines_of(cameras)) {
-    const auto words = words_of_line(line.text);
-    if (words.empty()) continue;
-    EMBERLOCK_ASSIGN_OR_RETURN(lenses[std::string(words[0])], colmap_lens(line, where));
+    if (words_of_line(line.text).empty()) continue;
+    EMBERLOCK_ASSIGN_OR_RETURN(ColmapCamera camera, camera_of_line(line, where));
+    model.cameras.push_back(std::move(camera));
   }
-  v1::Rig rig = empty_rig();
   const std::vector<Line> lines = lines_of(images);
   for (std::size_t i = 0; i < lines.size(); ++i) {
     if (words_of_line(lines[i].text).empty()) continue;
-    EMBERLOCK_ASSIGN_OR_RETURN(const ColmapImage image, colmap_image(lines[i], where));
-    const auto lens = lenses.find(image.camera);
-    if (lens == lenses.end()) {
-      return bad_colmap(where + "/images.txt, line " + std::to_string(lines[i].number),
-                        "cameras.txt has no camera " + image.camera, "Export both files together");
-    }
-    *rig.add_cameras() = rig_camera_of(camera_of_name(image.name), {lens->second, image.camera_from_world});
-    ++i;  // skips the line of its points, which may be empty
+    EMBERLOCK_ASSIGN_OR_RETURN(ColmapImage image, image_of_line(lines[i], where));
+    model.images.push_back(std::move(image));
+    if (i + 1 < lines.size() && is_line_of_points(lines[i + 1])) ++i;
   }
-  EMBERLOCK_RETURN_IF_ERROR(session::check_rig(rig, where + "/images.txt"));
-  return rig;
+  return rig_of_colmap(model, where + "/images.txt", notes);
 }
 
 std::string colmap_cameras(const v1::Rig& rig) {

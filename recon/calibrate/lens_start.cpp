@@ -17,8 +17,9 @@ constexpr std::size_t kViewsForStart = 25;  // more only cost time, since the bu
 constexpr double kFarCorner = 0.85;         // of the half diagonal
 constexpr double kParallel = 0.1;           // radians: boards closer than that are parallel
 constexpr double kWorstFocal = 0.05;
-constexpr double kWorstCenter = 0.1;  // of the width
-constexpr double kSignificant = 3;    // standard deviations
+constexpr double kWorstNoise = 0.005;  // of the half diagonal: a voxel of a volume of 200 across
+constexpr double kWorstCenter = 0.1;   // of the width
+constexpr double kSignificant = 3;     // standard deviations
 
 /// OpenCV counts pixels from the centre of the first one.
 constexpr double kOpencvShift = 0.5;
@@ -112,27 +113,41 @@ double reach_of_corners(const Bundle& bundle) {
   return reach / middle.norm();
 }
 
+/// Whether the last free radial coefficient exceeds its uncertainty.
+bool last_term_is_significant(const Bundle& bundle) {
+  if (bundle.cameras[0].radial_terms == 0) return false;
+  const auto spread = covariance(bundle);
+  if (!spread) return false;
+  const Distortion& d = bundle.cameras[0].model.intrinsics.distortion;
+  const auto last = static_cast<std::size_t>(bundle.cameras[0].radial_terms - 1);
+  const Eigen::Index unknown = kRadialUnknowns[last];
+  return std::abs(std::array{d.k1, d.k2, d.k3}[last]) > kSignificant * std::sqrt((*spread)(unknown, unknown));
+}
+
 /// Frees k3 if corners are far enough out, and keeps it free if it is significant.
 Status choose_k3(Bundle& bundle) {
   if (reach_of_corners(bundle) < kFarCorner) return {};
   Bundle freed = bundle;
-  freed.cameras[0].k3 = ThirdRadial::free;
+  freed.cameras[0].radial_terms = kRadialTerms;
   EMBERLOCK_RETURN_IF_ERROR(adjust(freed, BundleLoss::squares));
-  const auto spread = covariance(freed);
-  if (!spread) return {};
-  const Intrinsics& lens = freed.cameras[0].model.intrinsics;
-  if (std::abs(lens.distortion.k3) > kSignificant * std::sqrt((*spread)(8, 8)) && distortion_inverts(lens))
+  if (last_term_is_significant(freed) && distortion_inverts(freed.cameras[0].model.intrinsics))
     bundle = std::move(freed);
+  return {};
+}
+
+/// Fixes k2, then k1, where the lens folds the picture and they aren't significant.
+Status hold_undetermined(Bundle& bundle) {
+  while (!distortion_inverts(bundle.cameras[0].model.intrinsics)) {
+    bundle.cameras[0].inflation = jackknife_inflation(bundle);
+    if (last_term_is_significant(bundle) || !hold_radial_term(bundle.cameras[0])) break;
+    EMBERLOCK_RETURN_IF_ERROR(adjust(bundle, BundleLoss::squares));
+  }
   return {};
 }
 
 Status check_determined(const BoardSightings& sightings, std::size_t camera, const LensStart& start) {
   const auto spread = covariance(start.bundle);
   const Intrinsics& lens = start.bundle.cameras[0].model.intrinsics;
-  const bool known = spread && std::sqrt((*spread)(0, 0)) < kWorstFocal * lens.fx &&
-                     std::sqrt((*spread)(1, 1)) < kWorstFocal * lens.fy &&
-                     std::sqrt((*spread)(2, 2)) < kWorstCenter * lens.size.width &&
-                     std::sqrt((*spread)(3, 3)) < kWorstCenter * lens.size.width;
   const double degrees = start.tilt * 180 / M_PI;
   if (start.tilt < kParallel) {
     return lens_error(
@@ -142,12 +157,10 @@ Status check_determined(const BoardSightings& sightings, std::size_t camera, con
                     degrees),
         "Take more pictures with the board tilted by 20 to 45 degrees, to the left, right, up and down");
   }
-  if (!known) {
-    return lens_error(sightings, camera,
-                      spread
-                          ? fmt::format("the views leave the lens open: focal length {:.0f} +- {:.0f} pixels",
-                                        lens.fx, std::sqrt((*spread)(0, 0)))
-                          : std::string("the views leave the lens open"),
+  const std::string misfit = spread ? lens_misfit(start.bundle.cameras[0], spread->diagonal().cwiseSqrt())
+                                    : "the views leave the lens open";
+  if (!misfit.empty()) {
+    return lens_error(sightings, camera, misfit,
                       fmt::format("Take more pictures with the board near, tilted more (now up to {:.0f} "
                                   "degrees), and in all parts "
                                   "of the picture",
@@ -161,6 +174,27 @@ Status check_determined(const BoardSightings& sightings, std::size_t camera, con
 }
 
 }  // namespace
+
+std::string lens_misfit(const BundleCamera& camera, const Eigen::VectorXd& sigma) {
+  const Intrinsics& lens = camera.model.intrinsics;
+  const double limit = kWorstNoise * 0.5 * std::hypot(lens.size.width, lens.size.height);
+  if (!(camera.noise <= limit))
+    return fmt::format("its corners miss by {:.1f} pixels, at most {:.1f} are allowed: no lens fits them",
+                       camera.noise, limit);
+  const bool known = sigma[0] < kWorstFocal * lens.fx && sigma[1] < kWorstFocal * lens.fy &&
+                     sigma.segment<2>(2).maxCoeff() < kWorstCenter * lens.size.width;
+  if (known) return {};
+  return fmt::format("the views leave the lens open: focal length {:.0f} +- {:.0f} pixels", lens.fx,
+                     sigma[0]);
+}
+
+bool hold_radial_term(BundleCamera& camera) {
+  if (camera.radial_terms == 0) return false;
+  --camera.radial_terms;
+  Distortion& d = camera.model.intrinsics.distortion;
+  *std::array{&d.k1, &d.k2, &d.k3}[static_cast<std::size_t>(camera.radial_terms)] = 0;
+  return true;
+}
 
 std::optional<Rigid3> board_pose(const Intrinsics& lens, const Board& board,
                                  const std::vector<BoardCorner>& corners) {
@@ -245,6 +279,7 @@ Result<LensStart> start_lens(const BoardSightings& sightings, std::size_t camera
     return too_few(start.sightings.size() - start.rejected.size());
   start.tilt = widest_tilt(bundle);
   EMBERLOCK_RETURN_IF_ERROR(choose_k3(bundle));
+  EMBERLOCK_RETURN_IF_ERROR(hold_undetermined(bundle));
   bundle.cameras[0].inflation = jackknife_inflation(bundle);
   EMBERLOCK_RETURN_IF_ERROR(check_determined(sightings, camera, start));
   return start;

@@ -58,31 +58,26 @@ class Brightness {
   const std::array<float, 256>* light_;
 };
 
-/// Where brightness crosses half way between black and white, along `outwards` (unit length) from a place
-/// near a side, pixels; nothing where no clear edge is within `reach` to either side.
+/// Where brightness first crosses half way between a border's black and the brightest around it, along
+/// `outwards` (unit length) from a place near a side, pixels. It is searched from `inside` pixels within the
+/// place, which must lie in the border, to `outside` beyond it. Nothing where it doesn't get brighter.
 std::optional<double> crossing(const Brightness& picture, const Eigen::Vector2d& place,
-                               const Eigen::Vector2d& outwards, double reach) {
+                               const Eigen::Vector2d& outwards, double inside, double outside) {
   constexpr double kStep = 0.25;
-  constexpr int kMost = 96;
-  const int half = std::clamp(static_cast<int>(reach / kStep), 4, kMost / 2);
-  if (!picture.covers(place - half * kStep * outwards) || !picture.covers(place + half * kStep * outwards))
-    return {};
-  std::array<double, kMost + 1> levels{};
-  const auto level = [&levels](int step) -> double& { return levels[static_cast<std::size_t>(step)]; };
-  for (int i = 0; i <= 2 * half; ++i) level(i) = picture.at(place + (i - half) * kStep * outwards);
-  const double dark = (level(0) + level(1)) / 2;
-  const double bright = (level(2 * half - 1) + level(2 * half)) / 2;
-  if (!(bright > dark)) return {};
+  if (!picture.covers(place - inside * outwards) || !picture.covers(place + outside * outwards)) return {};
+  std::vector<double> levels;
+  for (double at = -inside; at <= outside; at += kStep) levels.push_back(picture.at(place + at * outwards));
+  const double dark = (levels[0] + levels[1]) / 2;
+  double bright = dark;
+  for (std::size_t i = 1; i < levels.size(); ++i) bright = std::max(bright, (levels[i - 1] + levels[i]) / 2);
   const double middle = (dark + bright) / 2;
-  std::optional<double> nearest;
-  for (int i = 0; i < 2 * half; ++i) {
-    const double a = level(i);
-    const double b = level(i + 1);
-    if (!(a <= middle && b > middle)) continue;
-    const double at = (i - half + (middle - a) / (b - a)) * kStep;
-    if (!nearest || std::abs(at) < std::abs(*nearest)) nearest = at;
+  for (std::size_t i = 1; i < levels.size(); ++i) {
+    const double a = levels[i - 1];
+    const double b = levels[i];
+    if (a <= middle && b > middle)
+      return (static_cast<double>(i - 1) + (middle - a) / (b - a)) * kStep - inside;
   }
-  return nearest;
+  return {};
 }
 
 /// A line n . p = c in the undistorted picture.
@@ -147,12 +142,14 @@ class Undistorted {
   const Intrinsics& lens_;
 };
 
-/// The corners where the sides meet; as they were where a side isn't clear enough.
-void meet_sides(const Brightness& picture, const Undistorted& undistorted, int cells, SeenMarker& marker) {
+/// The corners where the sides meet; as they were where a side isn't clear enough. False where some corners
+/// aren't near those that OpenCV saw and others are unclear, so that they fit no square.
+bool meet_sides(const Brightness& picture, const Undistorted& undistorted, int cells, SeenMarker& marker) {
   constexpr int kAlong = 24;
   constexpr double kHalfPixel = 0.5;  // OpenCV counts from pixel centres
   const Eigen::Vector2d half = Eigen::Vector2d::Constant(kHalfPixel);
   std::array<std::optional<SideLine>, 4> sides;
+  std::array<double, 4> reaches{};
   Eigen::Vector2d middle = Eigen::Vector2d::Zero();
   for (const Eigen::Vector2d& corner : marker.corners) middle += corner / 4;
   for (std::size_t s = 0; s < 4; ++s) {
@@ -161,29 +158,45 @@ void meet_sides(const Brightness& picture, const Undistorted& undistorted, int c
     Eigen::Vector2d outwards(along.y(), -along.x());
     outwards.normalize();
     if (outwards.dot(from - middle) < 0) outwards = -outwards;
-    // Neither to the first cells of the pattern nor beyond a white margin of as much.
+    // Neither to the first cells of the pattern nor beyond a white margin of as much. OpenCV's corners can
+    // lie outside a thin white rim by half of its largest window, 12 pixels, but not inside the border.
     const double across = 2 * outwards.dot(from + along / 2 - middle) / cells;
-    const double reach = std::clamp(0.7 * across, 1.5, 8.0);
+    reaches[s] = std::clamp(0.7 * across, 1.5, 16.0);
+    const double outside = std::min(reaches[s], 8.0);
     std::vector<Eigen::Vector2d> places;
     for (int i = 0; i < kAlong; ++i) {
       const double share = 0.08 + 0.84 * (i + 0.5) / kAlong;  // corners are blurred along both sides
       const Eigen::Vector2d place = from + share * along - half;
-      if (const auto off = crossing(picture, place, outwards, reach))
+      if (const auto off = crossing(picture, place, outwards, reaches[s], outside))
         places.push_back(undistorted(place + *off * outwards + half));
     }
     sides[s] = line_through(places);
   }
-  constexpr double kFarthest = 3;  // pixels from where OpenCV saw it
+  constexpr double kNear = 3;  // pixels from where OpenCV saw it
   std::array<Eigen::Vector2d, 4> corners = marker.corners;
+  bool far = false;
+  bool unclear = false;
   for (std::size_t s = 0; s < 4; ++s) {
     const auto& before = sides[(s + 3) % 4];
-    if (!before || !sides[s]) continue;
-    const auto corner = meet(*before, *sides[s]);
-    if (!corner) continue;
-    const Eigen::Vector2d pixel = undistorted.back(*corner);
-    if ((pixel - corners[s]).norm() < kFarthest) corners[s] = pixel;
+    const auto corner = before && sides[s] ? meet(*before, *sides[s]) : std::nullopt;
+    const Eigen::Vector2d pixel = corner ? undistorted.back(*corner) : corners[s];
+    const double moved = (pixel - corners[s]).norm();
+    const bool clear =
+        corner && moved < std::max(kNear, M_SQRT2 * std::max(reaches[s], reaches[(s + 3) % 4]));
+    if (clear) corners[s] = pixel;
+    far = far || (clear && moved >= kNear);
+    unclear = unclear || !clear;
   }
   marker.corners = corners;
+  return !(far && unclear);
+}
+
+/// The light of a negative's levels.
+std::array<float, 256> negative_light(const std::array<float, 256>* light) {
+  std::array<float, 256> negative{};
+  for (std::size_t i = 0; i < negative.size(); ++i)
+    negative[i] = light != nullptr ? -(*light)[negative.size() - 1 - i] : static_cast<float>(i);
+  return negative;
 }
 
 }  // namespace
@@ -245,11 +258,18 @@ cv::Mat grey_of(const ImageView& picture) {
 }
 
 std::vector<SeenMarker> find_markers(const ImageView& picture, const std::string& dictionary,
-                                     const Intrinsics& lens, const std::array<float, 256>* light) {
+                                     const Intrinsics& lens, const std::array<float, 256>* light,
+                                     MarkerInk ink) {
   const auto known = marker_dictionary(dictionary);
   constexpr int kSmallest = 16;
   if (!known || std::min(picture.width(), picture.height()) < kSmallest) return {};
-  const cv::Mat grey = grey_of(picture);
+  cv::Mat grey = grey_of(picture);
+  std::array<float, 256> negative{};
+  if (ink == MarkerInk::light) {
+    cv::bitwise_not(grey, grey);
+    negative = negative_light(light);
+    light = &negative;
+  }
   std::vector<std::vector<cv::Point2f>> quads;
   std::vector<int> ids;
   cv::aruco::detectMarkers(grey, known, quads, ids, cv::aruco::DetectorParameters::create());
@@ -261,10 +281,17 @@ std::vector<SeenMarker> find_markers(const ImageView& picture, const std::string
     for (std::size_t c = 0; c < 4; ++c)
       marker.corners[c] = {static_cast<double>(quads[m][c].x) + 0.5,
                            static_cast<double>(quads[m][c].y) + 0.5};
-    meet_sides(brightness, undistorted, known->markerSize + 2, marker);
-    markers.push_back(marker);
+    if (meet_sides(brightness, undistorted, known->markerSize + 2, marker)) markers.push_back(marker);
   }
   return markers;
+}
+
+Image mirror_picture(const ImageView& picture) {
+  const cv::Mat grey = grey_of(picture);
+  Image image({{grey.cols, grey.rows}, PixelFormat::gray8, 8});
+  cv::Mat into(grey.rows, grey.cols, CV_8U, image.bytes().data());
+  cv::flip(grey, into, 1);
+  return image;
 }
 
 Image draw_marker(const std::string& dictionary, int id, int cell) {

@@ -29,12 +29,22 @@ std::optional<std::string> marker_dictionary_name(std::string_view name);
 /// How many markers there are in a dictionary of that list.
 int markers_in(const std::string& dictionary);
 
+enum class MarkerInk {
+  dark,   ///< black on white
+  light,  ///< white on black
+};
+
 /// The markers of a dictionary that are seen in a picture of any format. Each corner is where two sides meet:
-/// lines through the places at which brightness, across a side, is half way between black and white; they are
-/// straight where the lens's distortion is removed. `light`, if given, is the light of each of 256 grey
-/// levels, by which "half way" is meant; else levels are proportional to light.
+/// lines through the places at which brightness, from the border outwards, first is half way between the
+/// border's and the brightest around it, which may be a thin rim; they are straight where the lens's
+/// distortion is removed. `light`, if given, is the light of each of 256 grey levels, by which "half way" is
+/// meant; else levels are proportional to light.
 std::vector<SeenMarker> find_markers(const ImageView& picture, const std::string& dictionary,
-                                     const Intrinsics& lens, const std::array<float, 256>* light = nullptr);
+                                     const Intrinsics& lens, const std::array<float, 256>* light = nullptr,
+                                     MarkerInk ink = MarkerInk::dark);
+
+/// The mirror image of a picture (left and right exchanged), gray8.
+Image mirror_picture(const ImageView& picture);
 
 /// Draws a marker, `cell` pixels per cell of its pattern, with a white margin of one cell.
 Image draw_marker(const std::string& dictionary, int id, int cell);

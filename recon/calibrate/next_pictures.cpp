@@ -93,6 +93,13 @@ std::vector<std::string> next_pictures(const RigCalibration& calibration) {
   std::vector<std::string> advice;
   for (const CalibratedCamera& camera : calibration.cameras)
     if (!camera.placed) advice.push_back(camera.id + ": " + camera.why + ".");
+  for (const CalibratedCamera& camera : calibration.cameras) {
+    if (!camera.calibrated || camera.fit.radial_terms >= kUsualRadialTerms) continue;
+    advice.push_back(
+        fmt::format("{}: its corners stay too near to the picture's middle to determine {}, held at 0: the "
+                    "distortion further out is unknown. Hold the board in the picture's corners.",
+                    camera.id, camera.fit.radial_terms == 1 ? "k2" : "k1 and k2"));
+  }
   const auto coverage = corner_coverage(calibration);
   for (std::size_t b = 0; b < coverage.size(); ++b) {
     const CalibratedCamera& camera = calibration.cameras[calibration.bundle_camera[b]];

@@ -8,7 +8,7 @@
 #include "recon/calibrate/rig_formats.h"
 #include "tests/fuzz/target.h"
 
-// A rig's files: rig.json, and COLMAP's text, which a form feed parts into cameras.txt and images.txt.
+// A rig's files: rig.json, and COLMAP's text or binary, which a form feed parts into cameras and images.
 FUZZ_TARGET(rig_files) {
   using namespace emberlock;
   const std::string_view bytes(reinterpret_cast<const char*>(data), size);
@@ -29,6 +29,7 @@ FUZZ_TARGET(rig_files) {
     (void)recon::parse_board(bytes);
   } else {
     check_rig(recon::parse_colmap(bytes.substr(0, cut), bytes.substr(cut + 1), "fuzz"));
+    check_rig(recon::parse_colmap_binary(bytes.substr(0, cut), bytes.substr(cut + 1), "fuzz"));
   }
   return 0;
 }

@@ -44,6 +44,19 @@ inline void disturb(std::vector<recon::BoardCorner>& corners, const BoardRigOpti
   }
 }
 
+/// The corners that find_board() finds of a chessboard in the mirror image of a picture.
+inline std::vector<recon::BoardCorner> mirrored_corners(std::vector<recon::BoardCorner> corners,
+                                                        const recon::Board& board, int width) {
+  for (recon::BoardCorner& corner : corners) {
+    const int column = corner.id % board.columns;
+    const int row = corner.id / board.columns;
+    corner.id = board.rows % 2 == 0 ? (board.rows - 1 - row) * board.columns + column
+                                    : row * board.columns + board.columns - 1 - column;
+    corner.pixel.x() = width - corner.pixel.x();
+  }
+  return corners;
+}
+
 /// Boards go around the ring, each seen by two to four cameras; the first board is the world.
 inline BoardRig board_rig(const BoardRigOptions& options) {
   RandomStream random(options.seed, 77);

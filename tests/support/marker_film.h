@@ -27,6 +27,7 @@ struct PlateLook {
   int samples = 4;                              ///< along each side of a pixel
   bool srgb = true;                             ///< how light becomes levels
   bool hidden = false;                          ///< the marker is covered
+  double rim = 1;                               ///< metres of the white margin that are left, of one cell
   std::uint64_t seed = 1;
 };
 
@@ -43,7 +44,7 @@ inline recon::CameraModel before_plate(const recon::Intrinsics& lens, const Eige
 /// The picture of a printed marker, with its white margin, that lies in the plane z = 0 on a table.
 class Plate {
  public:
-  explicit Plate(const apply::Marker& marker) {
+  explicit Plate(const apply::Marker& marker) : half_(marker.size() / 2) {
     constexpr int kCell = 24;
     if (marker.board) {
       print_ = recon::draw_board(*marker.board, kCell * 8);
@@ -95,6 +96,7 @@ class Plate {
     const double x = p.x() / pixel_ + size.width / 2.0;
     const double y = -p.y() / pixel_ + size.height / 2.0;
     if (!(x >= 0 && y >= 0 && x < size.width && y < size.height)) return look.table;
+    if (std::max(std::abs(p.x()) - half_.x(), std::abs(p.y()) - half_.y()) > look.rim) return look.table;
     const bool white = print_.view().row_as<std::uint8_t>(static_cast<int>(y))[static_cast<int>(x)] > 127;
     return white ? look.paper : look.ink;
   }
@@ -122,6 +124,7 @@ class Plate {
     return sum / (look.samples * look.samples);
   }
 
+  Eigen::Vector2d half_;  ///< of the marker, metres
   Image print_;
   double pixel_ = 0;  ///< metres
 };

@@ -130,6 +130,57 @@ TEST(MarkerSlow, ABoardIsSeenWhereAPartOfItIsHidden) {
   }
 }
 
+/// A rim that is cut too narrow must not be taken for the edge: the distance is right to 3 %, or nothing is
+/// found.
+TEST(MarkerSlow, ACutMarginLeavesTheDistance) {
+  const Marker marker = usual_marker();
+  const Plate plate(marker);
+  int found = 0;
+  int cases = 0;
+  for (const double rim : {0.0, 0.4e-3, 0.8e-3, 1.2e-3, 1.6e-3, 2e-3, 3e-3, 6e-3, 13e-3}) {
+    for (const double distance : {0.35, 0.7, 1.3}) {
+      for (const double tilt : {0.0, 35.0}) {
+        const recon::CameraModel camera = camera_of({800, distance, tilt, 20, {}, 0.03});
+        test::PlateLook look;
+        look.rim = rim;
+        look.noise = 2;
+        look.samples = 3;
+        look.table = distance > 1 ? 0.05 : 0.3;  // as dark as the ink, or grey
+        ++cases;
+        const auto points = find_marker(plate.seen_by(camera, look).view(), marker, camera.intrinsics);
+        if (points.empty()) continue;
+        const auto poses = marker_poses(points, camera.intrinsics);
+        ASSERT_FALSE(poses.empty());
+        const double z = poses.front().camera_from_marker.translation.norm();
+        EXPECT_NEAR(z / camera.camera_from_world.translation.norm(), 1, 0.03)
+            << rim << ' ' << distance << ' ' << tilt;
+        ++found;
+      }
+    }
+  }
+  EXPECT_GE(found, cases / 2);
+}
+
+TEST(MarkerTest, AMarkerMayBeWhiteOnBlack) {
+  for (const char* words : {"aruco:4X4_50:7:80mm", "aruco:5X5_100:33:80mm", "aruco:6X6_250:200:80mm",
+                            "aruco:ORIGINAL:500:80mm", "charuco:5x4:30mm:22mm:4X4_50"}) {
+    const Marker marker = parse_marker(words).value();
+    const recon::CameraModel camera = before_plate(table_lens(600, kBarrel), {0.1, -0.08, 0.35});
+    test::PlateLook look;
+    std::swap(look.paper, look.ink);
+    const Image picture = Plate(marker).seen_by(camera, look);
+    const auto points = find_marker(picture.view(), marker, camera.intrinsics);
+    ASSERT_FALSE(points.empty()) << words;
+    EXPECT_LT(off_truth(marker, camera, marker_poses(points, camera.intrinsics).front().camera_from_marker),
+              0.7)
+        << words;
+    const Image mirrored = recon::mirror_picture(picture.view());
+    EXPECT_TRUE(find_marker(mirrored.view(), marker, camera.intrinsics).empty()) << words;
+    EXPECT_TRUE(is_mirrored(mirrored.view(), marker, camera.intrinsics)) << words;
+    EXPECT_FALSE(is_mirrored(picture.view(), marker, camera.intrinsics)) << words;
+  }
+}
+
 TEST(MarkerTest, OfTwoPosesOneIsTheTruth) {
   const Marker marker = usual_marker();
   const recon::CameraModel camera = camera_of({600, 3, 35, 60, {}, 0.1});

@@ -7,6 +7,8 @@
 #include <gmock/gmock.h>
 
 #include "recon/calibrate/carried_board.h"
+#include "recon/calibrate/markers.h"
+#include "tests/support/board_rig.h"
 #include "tests/support/results.h"
 
 namespace emberlock::recon {
@@ -110,6 +112,52 @@ TEST(Board, PartOfACharucoBoardHasItsNumbers) {
   for (const BoardCorner& corner : corners) found.push_back(corner.id);
   EXPECT_THAT(found, testing::UnorderedElementsAreArray(visible));
   EXPECT_LT(worst_corner(corners, board, camera, pose), 0.4);
+}
+
+/// The picture with black and white exchanged.
+Image negative_of(Image picture) {
+  for (std::byte& level : picture.bytes()) level = ~level;
+  return picture;
+}
+
+TEST(Board, ACharucoBoardMayBeWhiteOnBlack) {
+  for (const char* words : {"charuco:7x5:24mm:17mm:5X5_100", "charuco:6x5:24mm:18mm:4X4_50"}) {
+    const Board board = *parse_board(words);
+    CameraModel camera = watcher();
+    camera.intrinsics = {{640, 480}, 600, 600, 326, 236, {}};
+    for (const double angle : {0.0, 0.4, M_PI}) {
+      const Rigid3 pose = turned_board(board, angle);
+      const Image picture = board_picture(camera, board, pose);
+      const auto corners = find_board(negative_of(picture).view(), board);
+      EXPECT_EQ(corners.size(), find_board(picture.view(), board).size()) << words << angle;
+      EXPECT_LT(worst_corner(corners, board, camera, pose), 0.4) << words << angle;
+    }
+  }
+}
+
+TEST(Board, AMirroredCharucoBoardIsNamedAndAMirroredChessboardIsCountedAsOne) {
+  const CameraModel camera = watcher();
+  for (const char* words : {"charuco:6x5:24mm:18mm:4X4_50", "charuco:7x5:24mm:17mm:5X5_100"}) {
+    CameraModel large = camera;
+    large.intrinsics = {{640, 480}, 600, 600, 326, 236, {}};
+    const Board board = *parse_board(words);
+    const Image picture = board_picture(large, board, turned_board(board, 0.2));
+    const Image mirrored = mirror_picture(picture.view());
+    const BoardSearch search = search_for(board);
+    EXPECT_FALSE(search.find_mirrored(picture.view()));
+    EXPECT_TRUE(search.find(mirrored.view()).empty());
+    EXPECT_TRUE(search.find_mirrored(mirrored.view()));
+    EXPECT_TRUE(search.find_mirrored(negative_of(mirrored).view()));
+  }
+  for (const char* words : {"chessboard:9x6:18mm", "chessboard:6x9:18mm", "chessboard:8x5:18mm"}) {
+    const Board board = *parse_board(words);
+    EXPECT_FALSE(search_for(board).find_mirrored);
+    const Rigid3 pose = turned_board(board, 0.2);
+    const auto corners = find_board(mirror_picture(board_picture(camera, board, pose).view()).view(), board);
+    ASSERT_EQ(corners.size(), static_cast<std::size_t>(board.corners())) << words;
+    for (const BoardCorner& corner : test::mirrored_corners(corners, board, camera.intrinsics.size.width))
+      EXPECT_LT((camera.project(pose * board.point(corner.id)) - corner.pixel).norm(), 0.5) << words;
+  }
 }
 
 TEST(Board, ThereIsNoneInAnEmptyOrTinyPicture) {

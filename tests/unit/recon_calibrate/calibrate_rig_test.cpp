@@ -6,6 +6,7 @@
 #include <gmock/gmock.h>
 
 #include "recon/calibrate/next_pictures.h"
+#include "recon/calibrate/pose.h"
 #include "tests/support/pose_errors.h"
 #include "tests/support/results.h"
 
@@ -131,6 +132,102 @@ TEST(CalibrateRig, ABoardThatLooksTheSameUpsideDownIsRefusedForSeveralCameras) {
   BoardSightings sightings = test::board_rig(small_rig(2, 4)).sightings;
   sightings.board.columns = 10;
   EXPECT_THAT(calibrate_rig(sightings), FailsWith("upside down"));
+}
+
+/// Mirrors what a camera sees.
+void mirror(BoardSightings& sightings, std::size_t camera) {
+  for (auto& sighting : sightings.sightings)
+    if (sighting.camera == camera)
+      sighting.corners =
+          test::mirrored_corners(sighting.corners, sightings.board, sightings.cameras[camera].size.width);
+}
+
+TEST(CalibrateRigSlow, MirroredCamerasAreNamedAndTheOthersSolvedWithoutThem) {
+  struct Case {
+    int cameras, instants;
+    std::vector<std::size_t> mirrored, named;
+  };
+  const Case cases[] = {{2, 14, {1}, {1}}, {2, 14, {0}, {1}},   {3, 20, {0}, {0}},
+                        {3, 20, {2}, {2}}, {5, 30, {1}, {1}},   {5, 30, {1, 3}, {1, 3}},
+                        {2, 14, {}, {}},   {2, 14, {0, 1}, {}}, {3, 20, {}, {}}};
+  std::uint64_t seed = 1;
+  for (const Case& c : cases) {
+    test::BoardRigOptions options = small_rig(c.cameras, c.instants);
+    options.seed = seed++;
+    test::BoardRig rig = test::board_rig(options);
+    for (const std::size_t camera : c.mirrored) mirror(rig.sightings, camera);
+    const auto found = value_of(calibrate_rig(rig.sightings));
+    std::vector<std::size_t> named;
+    for (std::size_t i = 0; i < found.cameras.size(); ++i) {
+      if (found.cameras[i].calibrated) continue;
+      named.push_back(i);
+      EXPECT_THAT(found.cameras[i].why, HasSubstr("mirror images"));
+    }
+    EXPECT_EQ(named, c.named) << testing::PrintToString(c.mirrored);
+    EXPECT_EQ(found.whole(), c.named.empty());
+    EXPECT_LT(rms_of(found.bundle), 0.5);
+    for (const RigCalibration::Rejected& view : found.rejected)
+      EXPECT_THAT(c.named, testing::Contains(rig.sightings.sightings[view.sighting].camera))
+          << "views of sound cameras aren't blamed";
+  }
+}
+
+TEST(CalibrateRig, ACameraOfOtherInstantsIsNamed) {
+  test::BoardRig rig = test::board_rig(small_rig(3, 20));
+  std::vector<BoardSightings::Sighting*> views;
+  for (auto& sighting : rig.sightings.sightings)
+    if (sighting.camera == 1) views.push_back(&sighting);
+  for (std::size_t i = 0; 2 * i < views.size(); ++i)
+    std::swap(views[i]->corners, views[views.size() - 1 - i]->corners);
+  const auto found = value_of(calibrate_rig(rig.sightings));
+  EXPECT_FALSE(found.whole());
+  EXPECT_FALSE(found.cameras[1].placed);
+  EXPECT_TRUE(found.cameras[1].calibrated) << "its lens is its own";
+  EXPECT_THAT(found.cameras[1].why, HasSubstr("at one instant"));
+  EXPECT_TRUE(found.cameras[0].placed);
+  EXPECT_TRUE(found.cameras[2].placed);
+  EXPECT_LT(rms_of(found.bundle), 0.5);
+}
+
+TEST(CalibrateRig, CornersThatNoLensFitsAreRefused) {
+  test::BoardRigOptions options = small_rig(2, 12);
+  options.noise = 4;
+  EXPECT_THAT(calibrate_rig(test::board_rig(options).sightings), FailsWith("no lens fits them"));
+}
+
+/// Boards that fill only the middle of the picture don't determine k2, nor must they.
+TEST(CalibrateRigSlow, BoardsInTheMiddleGiveTheFocalLength) {
+  int held = 0;
+  for (std::uint64_t seed = 1; seed <= 20; ++seed) {
+    const Intrinsics lens{{640, 480}, 700, 700, 320, 240, {}};
+    BoardSightings sightings;
+    sightings.board = {BoardKind::chessboard, 9, 6, Meters(0.018)};
+    sightings.cameras.push_back({"cam", lens.size});
+    RandomStream random(seed, 5);
+    for (std::size_t i = 0; i < 14; ++i) {
+      const Eigen::Vector3d middle = sightings.board.point(sightings.board.corners() - 1) / 2;
+      const Eigen::Vector3d from(random.uniform(-0.5, 0.5), random.uniform(-0.5, 0.5), 0.8);
+      const CameraModel camera =
+          look_at(lens, middle + 0.6 * from.normalized(), middle, Eigen::Vector3d::UnitY());
+      BoardSightings::Sighting view{0, i, "picture", {}};
+      for (int id = 0; id < sightings.board.corners(); ++id) {
+        view.corners.push_back({id, camera.project(sightings.board.point(id)) +
+                                        0.15 * Eigen::Vector2d(random.normal(), random.normal())});
+      }
+      sightings.sightings.push_back(std::move(view));
+      sightings.instants.push_back(std::to_string(i));
+    }
+    const auto found = value_of(calibrate_rig(sightings));
+    const CalibratedCamera& camera = found.cameras[0];
+    ASSERT_TRUE(camera.placed) << camera.why;
+    EXPECT_NEAR(camera.fit.model.intrinsics.fx, 700, std::max(7.0, 3.5 * camera.sigma[0])) << seed;
+    EXPECT_TRUE(distortion_inverts(camera.fit.model.intrinsics)) << seed;
+    if (camera.fit.radial_terms == kUsualRadialTerms) continue;
+    ++held;
+    EXPECT_EQ(camera.fit.model.intrinsics.distortion.k2, 0);
+    EXPECT_THAT(next_pictures(found), testing::Contains(HasSubstr("distortion further out is unknown")));
+  }
+  EXPECT_GT(held, 0) << "else nothing is tested";
 }
 
 TEST(CalibrateRig, TheSquareRootLaw) {

@@ -99,17 +99,16 @@ TEST(RigFiles, BadFilesNameTheLineAndTheRemedy) {
   struct Case {
     const char *cameras, *images, *words;
   };
-  for (const Case& bad :
-       {Case{"1 FISHEYE 640 480 1 2 3", "", "cameras.txt, line 1"},
-        Case{"1 PINHOLE 640 480 500 510 320", "", "PINHOLE has 4"},
-        Case{"1 PINHOLE 640 480 500 x 320 240", "", "\"x\" is no number"},
-        Case{"1 PINHOLE 0 480 500 500 320 240", "", "out of range"},
-        Case{"1 FULL_OPENCV 640 480 500 500 320 240 0 0 0 0 0 1 0 0", "", "k4, k5 and k6"},
-        Case{"1 PINHOLE 640 480 500 500 320 240", "1 2 0 0 0 0 0 0 1 a.png", "quaternion"},
-        Case{"1 PINHOLE 640 480 500 500 320 240", "1 1 0 0 0 0 0 0 2 a.png", "no camera 2"},
-        Case{"1 PINHOLE 640 480 500 500 320 240", "1 1 0 0", "is no image"},
-        Case{"1 PINHOLE 640 480 500 500 320 240", "1 1 0 0 0 0 0 0 1 ../a.png", "camera id"},
-        Case{"", "", "no cameras"}}) {
+  for (const Case& bad : {Case{"1 FISHEYE 640 480 1 2 3", "", "cameras.txt, line 1"},
+                          Case{"1 PINHOLE 640 480 500 510 320", "", "PINHOLE has 4"},
+                          Case{"1 PINHOLE 640 480 500 x 320 240", "", "\"x\" is no number"},
+                          Case{"1 PINHOLE 0 480 500 500 320 240", "", "out of range"},
+                          Case{"1 FULL_OPENCV 640 480 500 500 320 240 0 0 0 0 0 1 0 0", "", "k4, k5 and k6"},
+                          Case{"1 PINHOLE 640 480 500 500 320 240", "1 2 0 0 0 0 0 0 1 a.png", "quaternion"},
+                          Case{"1 PINHOLE 640 480 500 500 320 240", "1 1 0 0 0 0 0 0 2 a.png", "no camera 2"},
+                          Case{"1 PINHOLE 640 480 500 500 320 240", "1 1 0 0", "is no image"},
+                          Case{"1 PINHOLE 640 480 500 500 320 240", "1 1 0 0 0 0 0 0 1 ..", "camera id"},
+                          Case{"", "", "no cameras"}}) {
     const auto rig = parse_colmap(bad.cameras, bad.images, "model");
     ASSERT_THAT(rig, FailsWith(bad.words)) << bad.words;
     EXPECT_FALSE(rig.error().remedy.empty());

@@ -72,16 +72,13 @@ bool sees_box(const CameraModel& camera, const Box& box) {
 
 /// Why a view is blind; nothing where it isn't.
 std::optional<std::string> blindness(const View& view, const FlameMask& mask, const Box& box) {
-  if (!sees_box(view.camera, box))
-    return "looks past the box: none of its pixels' rays meets it. Check its pose and the box";
+  if (!sees_box(view.camera, box)) return "looks past the box: none of its pixels' rays meets it";
   if (!mask.box.empty()) return std::nullopt;
   const std::array<float, 3> medians = median_of(*view.image);
   if (view.background || stands_out(*view.image, medians)) return std::nullopt;
   const double level = *std::max_element(medians.begin(), medians.end());
   const char* kind = level < 1 ? "black" : level >= kWhite - 1 ? "white (saturated)" : "of one grey";
-  return fmt::format(
-      "shows no flame: its picture is {}, {:.3g} of 255 grey levels. Check its exposure and its lens cap",
-      kind, level);
+  return fmt::format("shows no flame: its picture is {}, {:.3g} of 255 grey levels", kind, level);
 }
 
 }  // namespace
@@ -105,11 +102,14 @@ Result<PreparedScene> leave_out_blind_views(PreparedScene scene, const ComputeOp
     }
   }
   if (blind_inputs == inputs || (blind_inputs > 0 && inputs - blind_inputs < 2))
-    return Error{ErrorKind::not_converged,
-                 fmt::format("{} of {} input views show nothing of the flame: {}", blind_inputs, inputs,
-                             fmt::join(words, "; ")),
-                 "views", "Take another frame, or give at least two pictures that show the flame"};
-  for (const std::string& why : words) warnings.push_back(why + ". The result does without this view");
+    return Error{
+        ErrorKind::not_converged,
+        fmt::format("{} of {} input views show nothing of the flame: {}", blind_inputs, inputs,
+                    fmt::join(words, "; ")),
+        "views",
+        "Check exposures, lens caps, poses and the box; give at least two pictures that show the flame"};
+  for (const std::string& why : words)
+    warnings.push_back(why + ". The result does without this view; check its picture and its pose");
   return blind.empty() ? std::move(scene) : scene.without(blind);
 }
 

@@ -120,7 +120,8 @@ TEST(BlindViews, AreLeftOutAndNamedWhereNothingOfTheFlameIsSeen) {
     EXPECT_EQ(seeing.scene().views[0].role, c.why ? ViewRole::left_out : ViewRole::input) << c.name;
     for (std::size_t v = 1; v < 5; ++v) EXPECT_EQ(seeing.told().views[v].role, ViewRole::input) << c.name;
     ASSERT_EQ(warnings.size(), c.why ? 1U : 0U) << c.name;
-    if (c.why) EXPECT_THAT(warnings[0], testing::AllOf(HasSubstr("camera 0"), HasSubstr(c.why))) << c.name;
+    if (!c.why) continue;
+    EXPECT_THAT(warnings[0], testing::AllOf(HasSubstr("camera 0"), HasSubstr(c.why))) << c.name;
   }
 }
 

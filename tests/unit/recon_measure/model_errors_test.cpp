@@ -41,10 +41,13 @@ TEST(Blended, IsTheMeanOfWhatGlows) {
   each_point(done.volume.grid, [&](int i, int j, int k, std::size_t p) {
     const bool glows = i + j + k > 3;
     EXPECT_EQ(blend.extinction[p], done.volume.extinction[p]) << "even, and dark where it was";
-    if (!glows) EXPECT_EQ(blend.emission[3 * p], 0);
+    if (!glows) {
+      EXPECT_EQ(blend.emission[3 * p], 0);
+    }
     const auto inner = [](int at) { return at > 0 && at < 8; };
-    if (i + j + k > 6 && inner(i) && inner(j) && inner(k))
+    if (i + j + k > 6 && inner(i) && inner(j) && inner(k)) {
       EXPECT_NEAR(blend.emission[3 * p + 1], done.volume.emission[3 * p + 1], 1e-4) << "linear";
+    }
   });
 }
 

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
+#include <cmath>
 #include <cstdio>
 #include <filesystem>
 #include <memory>
@@ -50,7 +51,7 @@ struct Measured {
     std::optional<recon::SphereFlux> sphere;
   };
   Heat heat;
-  Heat error;  // by which each is higher if all voxels are hotter by one sigma
+  Heat error;  // by which each is off if all voxels are hotter by one sigma
 };
 
 Result<Targets> parse_targets(const MeasureArguments& arguments) {
@@ -91,11 +92,12 @@ Measured::Heat heat_of(const recon::HotVolume& hot, const Targets& targets,
 
 Measured::Heat difference(const Measured::Heat& a, const Measured::Heat& b) {
   Measured::Heat out;
-  out.power = a.power - b.power;
-  if (a.flux) out.flux = *a.flux - *b.flux;
+  out.power = std::abs(a.power - b.power);
+  if (a.flux) out.flux = std::abs(*a.flux - *b.flux);
   if (a.sphere)
-    out.sphere = recon::SphereFlux{a.sphere->mean - b.sphere->mean, a.sphere->most - b.sphere->most,
-                                   a.sphere->power - b.sphere->power, a.sphere->held};
+    out.sphere = recon::SphereFlux{std::abs(a.sphere->mean - b.sphere->mean),
+                                   std::abs(a.sphere->most - b.sphere->most),
+                                   std::abs(a.sphere->power - b.sphere->power), a.sphere->held};
   return out;
 }
 
@@ -118,10 +120,16 @@ Result<Measured> measured(const std::string& name, const Targets& targets, const
     return Error{ErrorKind::bad_input, "has no temperatures with their errors", file.string(),
                  "Reconstruct it with --quantity temperature"};
   const std::vector<float>& sigma = *errors;
-  if (volume.extinction.empty())
+  EMBERLOCK_ASSIGN_OR_RETURN(const auto absorption, recon::read_values(file, "absorption", volume.grid));
+  EMBERLOCK_ASSIGN_OR_RETURN(const auto falls, recon::read_values(file, "absorption_sigma", volume.grid));
+  if (!absorption && volume.extinction.empty())
     return Error{ErrorKind::bad_input, "has no extinction, so that what it radiates isn't known",
-                 file.string(), "Reconstruct it with --effects auto or extinction=SIGMA"};
-  recon::HotVolume hot{volume.grid, *kelvin, volume.extinction};
+                 file.string(),
+                 "Reconstruct it with an absolute --response, with --effects auto or extinction=SIGMA"};
+  // Of a medium that is told to absorb evenly its emission knows better where it does.
+  recon::HotVolume hot{volume.grid, *kelvin, absorption ? *absorption : volume.extinction};
+  const std::vector<float> share = recon::shares_inside(volume);
+  for (std::size_t p = 0; p < share.size(); ++p) hot.absorption[p] *= share[p];
   Measured out;
   out.name = name;
   out.statistics = recon::statistics_of(hot, sigma, up);
@@ -130,8 +138,12 @@ Result<Measured> measured(const std::string& name, const Targets& targets, const
                  "See what its report.html says of temperatures"};
   out.heat = heat_of(hot, targets, compute);
   if (out.heat.sphere) EMBERLOCK_RETURN_IF_ERROR(check_sphere(*out.heat.sphere));
-  // All voxels off alike, as what is off in a response or an emitter is.
-  for (std::size_t p = 0; p < hot.kelvin.size(); ++p) hot.kelvin[p] += sigma[p];
+  // All voxels off alike, as what is off in a response or an emitter is. Where they are hotter, less of them
+  // emits the same light.
+  for (std::size_t p = 0; p < hot.kelvin.size(); ++p) {
+    hot.kelvin[p] += sigma[p];
+    if (falls) hot.absorption[p] -= (share.empty() ? 1 : share[p]) * (*falls)[p];
+  }
   out.error = difference(heat_of(hot, targets, compute), out.heat);
   return out;
 }

@@ -42,6 +42,11 @@ std::string rgb_text(const recon::ChannelRmse& e) {
   return fmt::format("{:.2f} / {:.2f} / {:.2f}", e[0], e[1], e[2]);
 }
 
+const char* caption(recon::ViewRole role) {
+  if (role == recon::ViewRole::input) return ", captured";
+  return role == recon::ViewRole::held_out ? ", captured (held out)" : ", captured (left out)";
+}
+
 bool is_held_out(const recon::View& view) { return view.role == recon::ViewRole::held_out; }
 
 void what_came_out(HtmlPage& page, const recon::Report& r) {
@@ -92,8 +97,7 @@ void views(HtmlPage& page, const recon::Scene& scene, const recon::Outcome& outc
     };
     const std::string name = fmt::format("{}: {}", i, view.name);
     page.raw("<div class=\"three\">" +
-             figure(panel(*view.image), "captured",
-                    name + (is_held_out(view) ? ", captured (held out)" : ", captured")) +
+             figure(panel(*view.image), "captured", name + caption(outcome.report.views[i].role)) +
              figure(panel(outcome.renders[i]), "rendered", "rendered from the volume") +
              figure(panel(difference(*view.image, outcome.renders[i], kDifferenceGainShown)), "difference",
                     "difference, " + rgb_text(outcome.report.views[i].rmse)) +

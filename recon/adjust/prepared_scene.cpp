@@ -68,6 +68,14 @@ PreparedScene PreparedScene::through(const std::vector<CameraModel>& cameras) co
   return other;
 }
 
+PreparedScene PreparedScene::without(const std::vector<std::size_t>& views) const {
+  PreparedScene other = *this;
+  for (const std::size_t v : views)
+    for (Scene* scene : {&other.told_, &other.linear_, &other.prepared_})
+      scene->views[v].role = ViewRole::left_out;
+  return other;
+}
+
 SharedMasks PreparedScene::masks(std::optional<double> threshold, const ComputeOptions& compute) const {
   const auto find = [&] {
     return std::make_shared<const std::vector<FlameMask>>(

@@ -29,6 +29,9 @@ class PreparedScene {
   /// The same scene through other cameras, one a view, that take pictures of the same size.
   [[nodiscard]] PreparedScene through(const std::vector<CameraModel>& cameras) const;
 
+  /// The same scene with the role `left_out` for these views.
+  [[nodiscard]] PreparedScene without(const std::vector<std::size_t>& views) const;
+
   [[nodiscard]] const Scene& scene() const { return prepared_; }
   /// Pictures as filmed, cameras as put right by through().
   [[nodiscard]] const Scene& told() const { return told_; }

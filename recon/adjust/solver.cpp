@@ -141,6 +141,7 @@ Result<Reconstruction> solve(const PreparedScene& scene, const Grid& grid, const
   std::vector<const View*> held_out;
   std::vector<PixelBox> held_out_boxes;
   for (std::size_t v = 0; v < linear.views.size(); ++v) {
+    if (linear.views[v].role == ViewRole::left_out) continue;
     const bool input = linear.views[v].role == ViewRole::input;
     (input ? setup.views : held_out).push_back(&linear.views[v]);
     const ImageSize size = linear.views[v].image->size;

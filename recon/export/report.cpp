@@ -47,8 +47,9 @@ ordered_json views_json(const Report& report) {
   for (const ViewReport& view : report.views) {
     views.push_back({{"index", views.size()},
                      {"name", view.name},
-                     {"role", view.role == ViewRole::input ? "input" : "held_out"},
-                     {"rmse", view.rmse}});
+                     {"role", name(view.role)},
+                     {"rmse", view.rmse},
+                     {"no_light", view.no_light}});
   }
   return views;
 }
@@ -116,6 +117,7 @@ ordered_json temperature_json(const std::optional<TemperatureSummary>& temperatu
   const TemperatureCounts& n = t.counts;
   return {
       {"emitter", name(t.emitter)},
+      {"response", t.response_given ? "given" : "linear sRGB, assumed"},
       {"absolute", t.absolute},
       {"by_absorption", t.by_absorption},
       {"opacity", t.opacity},
@@ -126,6 +128,7 @@ ordered_json temperature_json(const std::optional<TemperatureSummary>& temperatu
       {"chi_square", t.chi_square},
       {"emitter_told", t.emitter_told},
       {"if_other", t.if_other},
+      {"dispersion", t.dispersion},
       {"emitting", n.emitting},
       {"told", n.told},
       {"colder", n.colder},

@@ -24,6 +24,7 @@ struct ViewReport {
   std::string name;
   ViewRole role = ViewRole::input;
   ChannelRmse rmse = {};
+  ChannelRmse no_light = {};  ///< the same error of a volume without light
 };
 
 /// How a budget or a target was met: prediction of the front, and result.
@@ -107,15 +108,16 @@ struct Report {
 /// `preprocessing` [{step, on, reason}], `trace`
 /// [{seconds, iteration, input_rmse, heldout_rmse}] up to the iteration that was kept, `discarded` (the same
 /// of those after it), `trace_sample` {pixels, of} (its held-out errors are estimates from so many pixels,
-/// scaled so that the last is that of all), `views` [{index, name, role, rmse}], `deviations` (of the paper's
-/// solver from the paper), `voxel_choice` {rule, voxels, by_the_paper, calibration_seconds, expected_seconds,
-/// options [{voxels, seconds, error}], words}, `plan` (null without a budget or target), `errors` (null
-/// unless asked for: {light, emission, extinction, solves, seconds, noise: null or {pixel, emission,
-/// extinction, probes, seconds}}), `temperature` (null unless asked for: {emitter, absolute, by_absorption,
-/// opacity, mean, low, high, sigma, chi_square, emitter_told, if_other, emitting, told, colder, hotter,
-/// unclear, other, saturated, mixed, line_alone, alike, lines {automatic, found [{name, share, seen}], alike
-/// [names]}, joint {iterations, cost_before, cost_after, last_drop, moved, left_out}, solves, seconds
-/// {errors, reading, joint}}) and what describes the run. Held-out errors are null when nothing is held out.
+/// scaled so that the last is that of all), `views` [{index, name, role, rmse, no_light}], `deviations` (of
+/// the paper's solver from the paper), `voxel_choice` {rule, voxels, by_the_paper, calibration_seconds,
+/// expected_seconds, options [{voxels, seconds, error}], words}, `plan` (null without a budget or target),
+/// `errors` (null unless asked for: {light, emission, extinction, solves, seconds, noise: null or {pixel,
+/// emission, extinction, probes, seconds}}), `temperature` (null unless asked for: {emitter, response,
+/// absolute, by_absorption, opacity, mean, low, high, sigma, chi_square, emitter_told, if_other, dispersion,
+/// emitting, told, colder, hotter, unclear, other, saturated, mixed, line_alone, alike, lines {automatic,
+/// found [{name, share, seen}], alike [names]}, joint {iterations, cost_before, cost_after, last_drop, moved,
+/// left_out}, solves, seconds {errors, reading, joint}}) and what describes the run. Held-out errors are null
+/// when nothing is held out.
 std::string to_json(const Report& report);
 
 }  // namespace emberlock::recon

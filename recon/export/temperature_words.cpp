@@ -21,6 +21,11 @@ std::string way(const TemperatureSummary& t) {
     words += t.joint.iterations > 0 ? ", and emission over extinction where the joint solve starts"
                                     : ", and emission over extinction";
   if (!t.absolute) words += "; the camera's response is relative";
+  if (!t.response_given)
+    words +=
+        "; no response is given, so that cameras of linear sRGB are assumed. Those of other colours, or "
+        "pictures with a gamma, read hundreds of kelvin off: give --response (`emberlock colour` measures "
+        "one)";
   return words;
 }
 
@@ -108,6 +113,10 @@ std::vector<std::string> temperature_words(const TemperatureSummary& t) {
                     t.emitter == Emitter::grey ? "soot, which isn't grey" : "grey", t.if_other,
                     t.emitter == Emitter::grey ? "soot" : "grey",
                     t.emitter_told ? "" : ": which of the two isn't told, and each error holds it"));
+  if (t.dispersion != 0)
+    words.push_back(
+        fmt::format("soot whose E(m) is constant would be read {:.0f} K too {}: each error holds it",
+                    std::abs(t.dispersion), t.dispersion > 0 ? "hot" : "cold"));
   if (t.joint.left_out)
     words.push_back(
         fmt::format("solved together they show views that were left out {:.1f} % {} than as read{}",

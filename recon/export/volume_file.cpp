@@ -18,6 +18,7 @@
 #include <openvdb/openvdb.h>
 #pragma GCC diagnostic pop
 
+#include "recon/export/medium_grid.h"
 #include "recon/export/vdb_identity.h"
 
 namespace emberlock::recon {
@@ -309,6 +310,7 @@ Status write_volume(const Volume& volume, const std::filesystem::path& path,
   openvdb::GridPtrVec grids{emission_grid, density_grid};
   for (const NamedGrid& grid : further)
     grids.push_back(grid_of(volume.grid, grid.name, grid.unit, grid.values));
+  if (!volume.inside.empty()) grids.push_back(grid_of(volume.grid, kMedium, "1", medium_values(volume)));
   return write_file(grids, metadata_of(lighting), path, kEnd, certification);
 }
 
@@ -329,6 +331,10 @@ Result<Volume> read_volume(const std::filesystem::path& path) try {
   if (density->activeVoxelCount() > 0) volume.extinction.assign(volume.grid.size(), 0.0F);
   EMBERLOCK_RETURN_IF_ERROR(take_values(*density, volume.grid, "density", path,
                                         [&](std::size_t p, float value) { volume.extinction[p] = value; }));
+  if (!file->hasGrid(kMedium)) return volume;
+  EMBERLOCK_ASSIGN_OR_RETURN(const std::vector<float> filled,
+                             all_values(file->readGrid(kMedium), volume.grid, path));
+  EMBERLOCK_ASSIGN_OR_RETURN(volume.inside, voxels_of_medium(filled, volume.grid, path));
   return volume;
 } catch (const std::exception& e) {
   return damaged(path, e.what());
@@ -384,6 +390,7 @@ Result<SharedVolume> read_shared_volume(const std::filesystem::path& path) try {
     const auto unit = base->getMetadata<openvdb::StringMetadata>("unit");
     volume.grids.push_back({base->getName(), unit ? unit->value() : "", "", std::move(values)});
   }
+  EMBERLOCK_RETURN_IF_ERROR(fold_medium(volume, path));
   return volume;
 } catch (const std::bad_alloc&) {
   throw;  // of memory, not of the file

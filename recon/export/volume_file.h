@@ -24,6 +24,8 @@ struct NamedGrid {
 /// Writes an OpenVDB file for Houdini, Blender and ParaView:
 ///   `emission`  Vec3SGrid, RGB source of dL = S ds, grey levels (0..255) per metre
 ///   `density`   FloatGrid, extinction sigma_t, 1/m
+///   `medium`    FloatGrid where Volume::inside isn't empty: 1 at the lowest corner of each voxel that the
+///               medium fills. `emission` and `density` hold inside of these voxels; beyond them is nothing
 /// and `further` ones as FloatGrids, or Vec3SGrids where there are three values a point.
 /// Index (i, j, k) is key point (i, j, k); the grids' transform maps indices to metres. Points with value
 /// zero are inactive (background 0). Voxels below 0.02 mm, which OpenVDB refuses, are written in millimetres,
@@ -54,8 +56,9 @@ Result<std::vector<float>> read_grid(const std::filesystem::path& path, const st
 Result<std::optional<std::vector<float>>> read_values(const std::filesystem::path& path,
                                                       const std::string& name, const Grid& grid);
 
-/// All grids of a file of write_volume(), bit-identically, in the order of their names; their provenance is
-/// left empty. Errors: as read_volume().
+/// All grids of a file of write_volume() but `medium`, in the order of their names; their provenance is left
+/// empty. Bit-identical, except that `emission` and `density` of key points on the medium's border are
+/// multiplied by shares_inside(), as other programs interpolate beyond it. Errors: as read_volume().
 Result<SharedVolume> read_shared_volume(const std::filesystem::path& path);
 
 /// Where a program that opens a file takes a voxel's value to be.

@@ -112,16 +112,23 @@ Result<Box> find_box(const Scene& scene, const std::vector<FlameMask>& masks, co
     return no_box("box", "one view alone can't tell where the flame is", "Add a second view from elsewhere");
   std::vector<HalfSpace> cones;
   Eigen::Vector3d middle = Eigen::Vector3d::Zero();
+  const auto seeing =
+      std::count_if(masks.begin(), masks.end(), [](const FlameMask& mask) { return !mask.box.empty(); });
+  Scene all;  // of the views that see flame
   for (std::size_t v = 0; v < scene.views.size(); ++v) {
     const View& view = scene.views[v];
-    if (masks[v].box.empty())
+    const bool sees = !masks[v].box.empty();
+    if (!sees && seeing < 2)
       return no_box(view.name, "no pixel shows flame, so the box can't be found from the pictures",
                     "Take another frame, or leave the view out");
+    all.views.push_back({view.name, view.camera, {}, sees ? ViewRole::input : ViewRole::left_out});
+    if (!sees) continue;
     add_cone(view.camera, masks[v].box, cones);
-    middle += view.camera.center() / static_cast<double>(scene.views.size());
+    middle += view.camera.center() / static_cast<double>(seeing);
   }
   double spread = 0;
-  for (const View& view : scene.views) spread = std::max(spread, (view.camera.center() - middle).norm());
+  for (const View& view : all.views)
+    if (view.role == ViewRole::input) spread = std::max(spread, (view.camera.center() - middle).norm());
   const Eigen::Vector3d far = Eigen::Vector3d::Constant(kFar * std::max(spread, 1e-3));
   Bounds bounds{middle - far, middle + far};
   tighten(cones, bounds);
@@ -130,8 +137,6 @@ Result<Box> find_box(const Scene& scene, const std::vector<FlameMask>& masks, co
                   "Check that the cameras' poses are right and that all pictures show the same flame");
   };
   if (bounds.empty()) return apart();
-  Scene all;
-  for (const View& view : scene.views) all.views.push_back({view.name, view.camera, {}, ViewRole::input});
   double edge = 0;
   for (int round = 0; round < kRounds; ++round) {
     const double before = (bounds.high - bounds.low).maxCoeff();

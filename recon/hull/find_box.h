@@ -14,9 +14,9 @@ namespace emberlock::recon {
 /// Volume Dimension" it determines position and size of the flame from the calibration, but only from the
 /// masks. It intersects the views' cones through their masks, then carves coarsely and repeats that in the
 /// box of the result. A speck in a single view has no effect. The margin is 5 % plus one coarse voxel on
-/// every side; sizes are whole millimetres. `scene.box` isn't used; all views count, whatever their role.
-/// Errors name the view: fewer than two views, a view without flame, cones that don't intersect, or whose
-/// intersection is unbounded (parallel views).
+/// every side; sizes are whole millimetres. `scene.box` isn't used; all views that see flame count, whatever
+/// their role. Errors name the view: fewer than two views, or than two that see flame, cones that don't
+/// intersect, or whose intersection is unbounded (parallel views).
 Result<Box> find_box(const Scene& scene, const std::vector<FlameMask>& masks,
                      const ComputeOptions& compute = {});
 

@@ -33,7 +33,7 @@ std::vector<std::string> coverage_warnings(const Scene& scene) {
   for (const View& view : scene.views) {
     if (view.role == ViewRole::held_out) {
       held_out = true;
-    } else {
+    } else if (view.role == ViewRole::input) {
       directions.emplace_back((view.camera.center() - scene.box.center).normalized());
     }
   }

@@ -14,6 +14,7 @@
 #include "recon/adjust/prepared_scene.h"
 #include "recon/export/picture.h"
 #include "recon/export/volume_file.h"
+#include "recon/pipeline/blind_views.h"
 #include "recon/pipeline/certify.h"
 #include "recon/pipeline/planned_run.h"
 #include "recon/pipeline/planned_time.h"
@@ -44,14 +45,20 @@ void tell_pointing(const Scene& scene, const FoundPointing& found, Report& repor
 struct PutRight {
   PreparedScene scene;  // under what is known of its effects
   FoundPointing pointing;
+  std::vector<std::string> blind;  // warnings about views that are left out
 };
 
-PutRight with_cameras_put_right(const PreparedScene& told, const ReconstructOptions& options, Device device,
-                                const Elapsed& elapsed, const Progress& progress) {
-  PutRight result{options.taken_over ? told.under(options.taken_over->effects.effects)
-                                     : under_known_effects(told, options.effects.value_or(EffectRequest{}),
-                                                           options.solve.compute),
-                  {}};
+Result<PutRight> with_cameras_put_right(const PreparedScene& told, const ReconstructOptions& options,
+                                        Device device, const Elapsed& elapsed, const Progress& progress) {
+  std::vector<std::string> blind;
+  EMBERLOCK_ASSIGN_OR_RETURN(
+      PreparedScene seeing,
+      leave_out_blind_views(
+          options.taken_over
+              ? told.under(options.taken_over->effects.effects)
+              : under_known_effects(told, options.effects.value_or(EffectRequest{}), options.solve.compute),
+          options.solve.compute, blind));
+  PutRight result{std::move(seeing), {}, std::move(blind)};
   if (options.taken_over) {
     result.pointing = options.taken_over->pointing;
     if (result.pointing.any()) result.scene = pointed(result.scene, result.pointing);
@@ -102,6 +109,7 @@ Status measure(const Task& task, const ReconstructOptions& options, const Progre
       options.temperature->emitter, options.solve, task.elapsed, options.temperature->lines);
   TemperatureSummary& summary = outcome.temperature->summary;
   summary.time = task.elapsed() - start;
+  summary.response_given = options.temperature->response || task.scene().response;
   outcome.report.temperature = summary;
   return {};
 }
@@ -132,6 +140,10 @@ struct FurtherGrids {
     grids.push_back({"temperature", "K", outcome.temperature->kelvin});
     if (!outcome.temperature->sigma.empty())
       grids.push_back({"temperature_sigma", "K", outcome.temperature->sigma});
+    if (!outcome.temperature->absorption.empty()) {
+      grids.push_back({"absorption", "1/m", outcome.temperature->absorption});
+      grids.push_back({"absorption_sigma", "1/m", outcome.temperature->absorption_sigma});
+    }
     for (const LineSummary& line : outcome.temperature->summary.lines)
       line_names.push_back("line_" + line.name);
     for (std::size_t i = 0; i < line_names.size(); ++i)
@@ -154,14 +166,20 @@ Result<Outcome> reconstruct(const Scene& scene, const ReconstructOptions& option
   EMBERLOCK_ASSIGN_OR_RETURN(const PreparedScene told, PreparedScene::create(scene, {}));
   EMBERLOCK_ASSIGN_OR_RETURN(const Device device, resolve(options.solve.compute.device));
   const Elapsed elapsed = [&] { return clock.now() - start; };
-  const PutRight put_right = with_cameras_put_right(told, options, device, elapsed, progress);
-  const FoundPointing& pointing = put_right.pointing;
+  EMBERLOCK_ASSIGN_OR_RETURN(const PutRight put_right,
+                             with_cameras_put_right(told, options, device, elapsed, progress));
   const Task task{put_right.scene, device, elapsed, preview};
+  const auto conclude = [&](Outcome& outcome) -> Status {
+    outcome.pointing = put_right.pointing;
+    tell_pointing(scene, put_right.pointing, outcome.report);
+    std::vector<std::string>& warnings = outcome.report.warnings;
+    warnings.insert(warnings.begin(), put_right.blind.begin(), put_right.blind.end());
+    EMBERLOCK_RETURN_IF_ERROR(check_explained(outcome.report));
+    return measure(task, options, progress, outcome);
+  };
   if (has_goal(options)) {
     EMBERLOCK_ASSIGN_OR_RETURN(Outcome outcome, run_planned(task, options, progress));
-    outcome.pointing = pointing;
-    tell_pointing(scene, pointing, outcome.report);
-    EMBERLOCK_RETURN_IF_ERROR(measure(task, options, progress, outcome));
+    EMBERLOCK_RETURN_IF_ERROR(conclude(outcome));
     return outcome;
   }
   EMBERLOCK_ASSIGN_OR_RETURN(VoxelChoice choice, choose_voxels(task, options, progress));
@@ -169,9 +187,7 @@ Result<Outcome> reconstruct(const Scene& scene, const ReconstructOptions& option
   chosen.voxels = choice.voxels;
   EMBERLOCK_ASSIGN_OR_RETURN(Outcome outcome, run_once(task, chosen, progress));
   outcome.report.voxel_choice = std::move(choice);
-  outcome.pointing = pointing;
-  tell_pointing(scene, pointing, outcome.report);
-  EMBERLOCK_RETURN_IF_ERROR(measure(task, options, progress, outcome));
+  EMBERLOCK_RETURN_IF_ERROR(conclude(outcome));
   return outcome;
 } catch (const DeviceError& e) {
   return e.error();
@@ -189,8 +205,9 @@ Result<VoxelChoice> plan_voxels(const Scene& scene, const ReconstructOptions& op
   EMBERLOCK_ASSIGN_OR_RETURN(const Device device, resolve(options.solve.compute.device));
   const std::function<void(const Preview&)> nobody;
   const Elapsed elapsed = [&] { return clock.now() - start; };
-  const Task task{with_cameras_put_right(told, options, device, elapsed, progress).scene, device, elapsed,
-                  nobody};
+  EMBERLOCK_ASSIGN_OR_RETURN(const PutRight put_right,
+                             with_cameras_put_right(told, options, device, elapsed, progress));
+  const Task task{put_right.scene, device, elapsed, nobody};
   EMBERLOCK_ASSIGN_OR_RETURN(VoxelChoice choice, choose_voxels(task, options, progress));
   EMBERLOCK_RETURN_IF_ERROR(choose_grid(scene, options, choice.voxels));
   if (choice.rule == "knee" && has_goal(options)) {

@@ -104,7 +104,8 @@ Status check_output(const std::filesystem::path& folder,
 
 /// Writes volume.vdb (with grids `emission_sigma` and `density_sigma` where there are errors,
 /// `emission_noise` and `density_noise` where it is known what of them noise makes, `temperature` and
-/// `temperature_sigma`, if it is known, in K, active where told, and for each line emitter that was looked
+/// `temperature_sigma`, if it is known, in K, active where told, with an absolute response `absorption` and
+/// `absorption_sigma` (TemperatureField), and for each line emitter that was looked
 /// for `line_NAME`, its share of the light), views/NNNN.png (8 bits, numbered as in the input) and
 /// report.json as an OutputFolder; and `page` as report.html, unless it is empty. The volume carries a
 /// certificate, of which `certification` tells where the scene came from (certify.h).

@@ -30,12 +30,17 @@ std::vector<RadianceImage> rendered(const Volume& volume, const Hull& medium, co
                       options);
 }
 
+/// The voxels that a ray crosses.
+Hull medium_of(const Volume& volume) {
+  return volume.inside.empty() ? whole_grid(volume.grid) : filled_voxels(volume);
+}
+
 std::vector<RadianceImage> weighted_sums(const Volume& weighted,
                                          const std::vector<const CameraModel*>& cameras,
                                          const ComputeOptions& compute) {
   RenderOptions options;
   options.compute = compute;
-  return rendered(weighted, whole_grid(weighted.grid), absorption_of(weighted), cameras, options);
+  return rendered(weighted, medium_of(weighted), absorption_of(weighted), cameras, options);
 }
 
 Eigen::Vector3d from_middle(const Light& light, const Box& box) {
@@ -78,6 +83,11 @@ Hull filled_voxels(const Volume& volume) {
     return absorbs || rgb[0] > 0 || rgb[1] > 0 || rgb[2] > 0;
   };
   Hull medium = whole_grid(g);
+  if (!volume.inside.empty()) {
+    medium.inside = volume.inside;
+    medium.count = static_cast<std::size_t>(std::count(medium.inside.begin(), medium.inside.end(), 1));
+    return medium;
+  }
   medium.count = 0;
   std::size_t voxel = 0;
   for (int k = 0; k < g.nz - 1; ++k)
@@ -127,7 +137,7 @@ LightViews::LightViews(Volume volume, const Scattering& scattering, const Comput
       dark_{volume_.grid, {}, volume_.extinction},
       effects_(absorption_of(volume_)),
       compute_(compute),
-      medium_(whole_grid(volume_.grid)) {
+      medium_(medium_of(volume_)) {
   if (dark_.extinction.empty()) return;
   dark_.emission.resize(volume_.emission.size());
   if (scattering.order == Scattering::Order::none || scattering.albedo <= 0) return;
@@ -157,7 +167,8 @@ std::vector<ShownView> LightViews::of(const std::vector<const CameraModel*>& cam
 }
 
 TemperatureViews::TemperatureViews(const ShownVolume& shown, const ComputeOptions& compute)
-    : weighted_{shown.volume.grid, std::vector<float>(shown.volume.emission.size()), shown.volume.extinction},
+    : weighted_{shown.volume.grid, std::vector<float>(shown.volume.emission.size()), shown.volume.extinction,
+                shown.volume.inside},
       compute_(compute) {
   for (std::size_t p = 0; p < shown.kelvin.size(); ++p) {
     if (!(shown.kelvin[p] > 0)) continue;

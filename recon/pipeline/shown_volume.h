@@ -27,7 +27,7 @@ struct ShownVolume {
 /// and read_values().
 Result<ShownVolume> read_shown_volume(const std::filesystem::path& result);
 Box box_of(const Grid& grid);
-/// The voxels that hold anything: a result doesn't tell its hull.
+/// The voxels that the medium fills; of a volume that doesn't state them those that hold anything.
 Hull filled_voxels(const Volume& volume);
 
 /// Puts another light into the place of that which a lit medium was filmed under. Where nothing shades it,

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <unistd.h>
 
 #include "recon/adjust/paper.h"
@@ -62,14 +63,22 @@ std::optional<ChannelRmse> over_views(const std::vector<ViewReport>& views, View
   return sum;
 }
 
-std::vector<ViewReport> errors_of_views(const Scene& scene, const std::vector<FlameMask>& masks,
-                                        const std::vector<RadianceImage>& renders) {
-  std::vector<ViewReport> reports;
-  for (std::size_t i = 0; i < scene.views.size(); ++i) {
-    const View& view = scene.views[i];
-    reports.push_back({view.name, view.role, rmse(view, renders[i], masks[i].box)});
+/// Renders the scene's views `first` to `end` - 1 of a volume; each goes to `take(index, render)`.
+template <class Take>
+void render_all(const PreparedScene& solved, const Volume& volume, const Hull& medium, const Effects& effects,
+                const ComputeOptions& compute, std::size_t first, std::size_t end, const Take& take) {
+  std::vector<const CameraModel*> cameras;
+  std::vector<const RadianceImage*> backgrounds;
+  for (std::size_t v = first; v < end; ++v) {
+    cameras.push_back(&solved.scene().views[v].camera);
+    backgrounds.push_back(solved.scene().views[v].background.get());
   }
-  return reports;
+  std::size_t v = first;
+  for (RadianceImage& render :
+       render_views(volume, medium, effects, cameras, backgrounds, {.compute = compute})) {
+    solved.at_own_instant(render, v);
+    take(v++, std::move(render));
+  }
 }
 
 Report describe(const Scene& scene, const Grid& grid, const SolveOptions& options, Device device) {
@@ -151,27 +160,29 @@ Outcome finish(const Task& task, const PreparedScene& solved, const SolveOptions
   const Scene& scene = task.scene();
   Outcome outcome;
   const Seconds start = task.elapsed();
+  const SharedMasks masks = solved.masks(std::nullopt, options.compute);
+  std::vector<ViewReport> views;
   constexpr std::size_t kAtOnce = 10;  // views, between two looks at the progress
   for (std::size_t first = 0; first < scene.views.size(); first += kAtOnce) {
     tell(progress,
          kSolveTo + (1 - kSolveTo) * static_cast<double>(first) / static_cast<double>(scene.views.size()),
          "rendering the views");
-    std::vector<const CameraModel*> cameras;
-    std::vector<const RadianceImage*> backgrounds;
-    for (std::size_t v = first; v < std::min(first + kAtOnce, scene.views.size()); ++v) {
-      cameras.push_back(&solved.scene().views[v].camera);
-      backgrounds.push_back(solved.scene().views[v].background.get());
-    }
-    for (RadianceImage& render : render_views(done.volume, done.hull, done.effects, cameras, backgrounds,
-                                              {.compute = options.compute})) {
-      solved.at_own_instant(render, outcome.renders.size());
-      outcome.renders.push_back(std::move(render));
-    }
+    const std::size_t end = std::min(first + kAtOnce, scene.views.size());
+    const auto error = [&](std::size_t v, const RadianceImage& render) {
+      return rmse(scene.views[v], render, (*masks)[v].box);
+    };
+    render_all(solved, done.volume, done.hull, done.effects, options.compute, first, end,
+               [&](std::size_t v, RadianceImage render) {
+                 views.push_back({scene.views[v].name, scene.views[v].role, error(v, render)});
+                 outcome.renders.push_back(std::move(render));
+               });
+    render_all(solved, Volume{}, Hull{}, done.effects, options.compute, first, end,
+               [&](std::size_t v, const RadianceImage& render) { views[v].no_light = error(v, render); });
   }
   outcome.report = describe(scene, done.hull.grid, options, task.device);
   Report& result = outcome.report;
   result.hull_voxels = done.hull.count;
-  result.views = errors_of_views(scene, *solved.masks(std::nullopt, options.compute), outcome.renders);
+  result.views = std::move(views);
   result.input_rmse = over_views(result.views, ViewRole::input).value_or(ChannelRmse{});
   result.heldout_rmse = over_views(result.views, ViewRole::held_out);
   result.hull_time = done.hull_time;
@@ -185,9 +196,45 @@ Outcome finish(const Task& task, const PreparedScene& solved, const SolveOptions
   result.trace = done.trace;
   result.discarded = done.discarded;
   result.trace_sample = done.trace_sample;
+  done.volume.inside = done.hull.inside;
   outcome.reconstruction = std::move(done);
   tell(progress, 1, "done");
   return outcome;
+}
+
+Status check_explained(Report& report) {
+  constexpr double kUnexplained = 0.9;  // of the error that no light leaves
+  double unexplained = 0;
+  int inputs = 0;
+  std::vector<std::string> views;
+  for (const ViewReport& view : report.views) {
+    const double black = all_channels(view.no_light);
+    if (view.role == ViewRole::left_out || !(black > 0)) continue;
+    const double error = all_channels(view.rmse);
+    if (view.role == ViewRole::input) {
+      unexplained += error * error / (black * black);
+      ++inputs;
+    }
+    if (error > kUnexplained * black)
+      views.push_back(fmt::format("{} ({:.3g} of {:.3g} grey levels)", view.name, error, black));
+  }
+  if (views.empty()) return {};
+  const std::string which = fmt::format("{}", fmt::join(views, ", "));
+  if (inputs > 0 && std::sqrt(unexplained / inputs) > kUnexplained)
+    return Error{
+        ErrorKind::not_converged,
+        "less than a tenth of the light is explained: the volume leaves nearly the error of no light in " +
+            which,
+        "views",
+        "Check that these pictures show the flame, and the cameras' poses and the box (--plan DIR shows "
+        "them on the pictures)"};
+  report.warnings.insert(
+      report.warnings.begin(),
+      fmt::format(
+          "less than a tenth of the light is explained in {}, of the error that no light leaves. Check "
+          "these pictures and the poses of their cameras, or leave them out",
+          which));
+  return {};
 }
 
 Result<Outcome> run_once(const Task& task, const ReconstructOptions& options, const Progress& progress) {

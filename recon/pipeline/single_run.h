@@ -39,4 +39,8 @@ Result<Outcome> run_once(const Task& task, const ReconstructOptions& options, co
 Outcome finish(const Task& task, const PreparedScene& solved, const SolveOptions& options,
                Reconstruction done, const Progress& progress);
 
+/// Whether the volume explains a tenth of the light that the input views show, each view counting the same;
+/// warns of each view of which it doesn't. Error: not_converged, which names those views.
+Status check_explained(Report& report);
+
 }  // namespace emberlock::recon

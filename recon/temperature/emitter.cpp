@@ -34,16 +34,21 @@ double largest_log_planck(const CameraResponse& response, double kelvin) {
   return largest;
 }
 
-EmitterLevels integrated(const CameraResponse& response, Emitter emitter, double kelvin) {
+template <class Absorption>
+EmitterLevels integrated(const CameraResponse& response, double kelvin, const Absorption& absorption) {
   EmitterLevels out;
   out.log_scale = largest_log_planck(response, kelvin);
   for (std::size_t c = 0; c < 3; ++c) {
     if (is_dead(response, c)) continue;
     const double level = integral(response, c, [&](double nm) {
-      return relative_absorption(emitter, nm) * std::exp(log_planck(nm, kelvin) - out.log_scale);
+      return absorption(nm) * std::exp(log_planck(nm, kelvin) - out.log_scale);
     });
     out.value[c] = std::max(0.0, level);
   }
+  const double sum = out.value[0] + out.value[1] + out.value[2];
+  if (!(sum > 0)) return {{}, 0};
+  for (double& v : out.value) v /= sum;
+  out.log_scale += std::log(sum);
   return out;
 }
 
@@ -66,12 +71,12 @@ double relative_absorption(Emitter emitter, double nm) {
 }
 
 EmitterLevels levels_of(const CameraResponse& response, Emitter emitter, Kelvin temperature) {
-  EmitterLevels out = integrated(response, emitter, temperature.value());
-  const double sum = out.value[0] + out.value[1] + out.value[2];
-  if (!(sum > 0)) return {{}, 0};
-  for (double& v : out.value) v /= sum;
-  out.log_scale += std::log(sum);
-  return out;
+  return integrated(response, temperature.value(),
+                    [&](double nm) { return relative_absorption(emitter, nm); });
+}
+
+EmitterLevels levels_of_constant_soot(const CameraResponse& response, Kelvin temperature) {
+  return integrated(response, temperature.value(), [](double nm) { return kReferenceNm / nm; });
 }
 
 EmitterTable::EmitterTable(const CameraResponse& response, Emitter emitter, Kelvin coldest, Kelvin hottest)

@@ -41,6 +41,9 @@ struct EmitterLevels {
 };
 /// Integrated anew. Any temperature from 1 to 1e5 K.
 EmitterLevels levels_of(const CameraResponse& response, Emitter emitter, Kelvin temperature);
+/// The same of soot whose E(m) is constant, so that it absorbs as 1 / wavelength: the other form that is in
+/// use. Which of the two a flame's soot has isn't known.
+EmitterLevels levels_of_constant_soot(const CameraResponse& response, Kelvin temperature);
 
 /// levels_of() between two temperatures, tabled by 1 / T and linear between: within 1e-4 of it.
 class EmitterTable {

@@ -12,6 +12,7 @@
 #include "recon/adjust/guard.h"
 #include "recon/compute/pool.h"
 #include "recon/temperature/joint_temperature.h"
+#include "recon/temperature/model_errors.h"
 #include "recon/temperature/self_absorption.h"
 #include "recon/temperature/unmixing.h"
 #include "recon/temperature/view_errors.h"
@@ -191,22 +192,31 @@ std::vector<Glow> glows_of(const std::vector<Fate>& fates, Fate fate, const Voxe
   return out;
 }
 
+/// Adds to each temperature's error what `off` returns for a key point, in K; what becomes too uncertain
+/// isn't reported.
+template <class Off>
+void add_error(Readings& readings, const Off& off) {
+  TemperatureField& field = readings.field;
+  for (std::size_t p = 0; p < field.kelvin.size(); ++p) {
+    float& kelvin = field.kelvin[p];
+    float& sigma = field.sigma[p];
+    if (!(kelvin > 0)) continue;
+    sigma = std::hypot(sigma, off(p));
+    if (static_cast<double>(sigma) < kMostUncertain * static_cast<double>(kelvin)) continue;
+    readings.fates[p] = Fate::unclear;
+    kelvin = sigma = 0;
+  }
+}
+
 /// Nobody told what glows: what the other kind would tell is part of each temperature's error. Where that
 /// doesn't explain what is seen there is nothing to add; where it tells no temperature for another reason,
 /// how far it is off isn't known.
 void doubt_emitter(const Readings& other, Readings& readings) {
-  TemperatureField& field = readings.field;
-  std::vector<Fate>& fates = readings.fates;
-  for (std::size_t p = 0; p < field.kelvin.size(); ++p) {
-    float& kelvin = field.kelvin[p];
-    float& sigma = field.sigma[p];
-    if (!(kelvin > 0) || other.fates[p] == Fate::other) continue;
+  add_error(readings, [&](std::size_t p) {
+    if (other.fates[p] == Fate::other) return 0.0F;
     const float instead = other.field.kelvin[p];
-    sigma = instead > 0 ? std::hypot(sigma, instead - kelvin) : INFINITY;
-    if (static_cast<double>(sigma) < kMostUncertain * static_cast<double>(kelvin)) continue;
-    fates[p] = Fate::unclear;
-    kelvin = sigma = 0;
-  }
+    return instead > 0 ? instead - readings.field.kelvin[p] : INFINITY;
+  });
 }
 
 /// What all readings of one volume share.
@@ -343,6 +353,55 @@ void take_together(const Asked& asked, Emitter emitter, Readings& readings) {
   }
 }
 
+/// Voxels blend what is hot with what is cold. What one more voxel's blend changes, as it is read by itself,
+/// is part of each temperature's error: much where a flame is a few voxels thick.
+void doubt_resolution(const Asked& asked, Emitter emitter, const std::vector<float>& read,
+                      Readings& readings) {
+  const Reconstruction coarser = blended(asked.done);
+  const Readings other =
+      read_all({asked.scene, coarser, asked.errors, asked.response, asked.options, asked.elapsed}, emitter);
+  add_error(readings, [&](std::size_t p) {
+    const float blend = other.field.kelvin[p];
+    return blend > 0 && read[p] > 0 ? blend - read[p] : 0.0F;
+  });
+}
+
+/// By Kirchhoff's law: what absorbs emits. How bright a place is tells its absorption better than pictures of
+/// what lies behind it do.
+void find_absorption(const Asked& asked, Emitter emitter, TemperatureField& field) {
+  const Volume& volume = asked.done.volume;
+  const double brightest =
+      static_cast<double>(*std::max_element(volume.emission.begin(), volume.emission.end()));
+  SelfAbsorption own;
+  if (emitter == Emitter::soot)
+    own = self_absorption(asked.scene, asked.done, asked.response, emitter, asked.options.compute);
+  const Thermometer meter(table_for(asked.done, asked.response, emitter));
+  const VoxelGlow glows(asked.done, asked.errors, meter.table(), std::move(own), asked.response, brightest);
+  field.absorption.resize(field.kelvin.size());
+  field.absorption_sigma.resize(field.kelvin.size());
+  for (std::size_t p = 0; p < field.kelvin.size(); ++p) {
+    const auto kelvin = static_cast<double>(field.kelvin[p]);
+    if (!(kelvin > 0)) continue;
+    Glow glow = glows.at(p, Beside::nothing);
+    glow.absorption_sigma = 0;  // not by what was reconstructed of it
+    const auto absorption_at = [&](double hot) {
+      double absorption = 0;
+      static_cast<void>(meter.chi_square(glow, hot, &absorption));
+      return absorption;
+    };
+    const double absorption = absorption_at(kelvin);
+    const double if_hotter = absorption_at(kelvin + static_cast<double>(field.sigma[p]));
+    field.absorption[p] = static_cast<float>(absorption);
+    field.absorption_sigma[p] = static_cast<float>(absorption - if_hotter);
+  }
+}
+
+TemperatureField with_absorption(const Asked& asked, Emitter emitter, bool lines, Readings readings) {
+  TemperatureField field = summed_up(asked.done.volume, std::move(readings));
+  if (asked.response.absolute && !lines) find_absorption(asked, emitter, field);
+  return field;
+}
+
 }  // namespace
 
 TemperatureField temperature_of(const Scene& scene, const Reconstruction& done, const VolumeErrors& errors,
@@ -363,7 +422,11 @@ TemperatureField temperature_of(const Scene& scene, const Reconstruction& done, 
     }
     for (const LineEmitter* rival : choice.rivals) read.field.summary.lines_alike.emplace_back(rival->name);
   }
-  if (!paper && named.empty()) take_together(asked, emitter, read);
+  const std::vector<float> by_voxel = read.field.kelvin;
+  if (!paper && named.empty()) {
+    take_together(asked, emitter, read);
+    doubt_resolution(asked, emitter, by_voxel, read);
+  }
   read.field.summary.lines_automatic = lines.automatic;
   read.field.summary.lines_tried = lines.automatic && !others.empty();
   read.field.summary.emitter_told = told.has_value();
@@ -374,7 +437,14 @@ TemperatureField temperature_of(const Scene& scene, const Reconstruction& done, 
   Readings other = read_all(asked, instead, named);
   if (!told) doubt_emitter(other, read);
   read.field.summary.if_other = summed_up(done.volume, std::move(other)).summary.mean;
-  return summed_up(done.volume, std::move(read));
+  if (emitter != Emitter::soot) return with_absorption(asked, emitter, !named.empty(), std::move(read));
+  const Dispersion dispersion(Thermometer(table_for(done, response, emitter)), response);
+  add_error(read, [&](std::size_t p) {
+    return static_cast<float>(dispersion.at(static_cast<double>(read.field.kelvin[p])));
+  });
+  TemperatureField field = with_absorption(asked, emitter, !named.empty(), std::move(read));
+  field.summary.dispersion = dispersion.at(field.summary.mean);
+  return field;
 }
 
 }  // namespace emberlock::recon

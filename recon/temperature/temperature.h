@@ -47,6 +47,9 @@ struct TemperatureSummary {
   double mean = 0, low = 0, high = 0;  ///< mean, and what 5 % and 95 % lie below
   double sigma = 0;                    ///< the median of the voxels' errors
   double chi_square = 0;               ///< mean per degree of freedom, as each was read; 0: there were none
+  bool response_given = true;          ///< by the user or the scene; else standard_response() is assumed
+  /// What soot of a constant E(m) would be read too hot by, K at the mean; each error of soot holds it.
+  double dispersion = 0;
   double if_other = 0;  ///< what the mean were if the glow were soot's instead of grey, or the reverse; as
                         ///< it is read, without a joint solve
   bool lines_automatic = false;         ///< chosen by the program
@@ -64,6 +67,9 @@ struct TemperatureSummary {
 struct TemperatureField {
   std::vector<float> kelvin, sigma;  ///< at key points, K; 0 where not told
   TemperatureSummary summary;
+  /// Where the response is absolute and there are no lines: the absorption at 550 nm that emits what was
+  /// reconstructed at these temperatures, 1/m; and by how much it falls if a temperature rises by its sigma.
+  std::vector<float> absorption = {}, absorption_sigma = {};
   std::vector<std::vector<float>> line_share = {};  ///< of the light, one list for each of summary.lines
 };
 
@@ -76,8 +82,9 @@ inline constexpr double kShareThatCounts = 0.05;
 /// absolute and nothing scatters, by emission over extinction. The paper: by green and its constant opacity
 /// of 0.05 a voxel edge, between 1000 and 2300 K; where the response is relative the brightest green is 2300
 /// K. With `lines`, valid by check_lines(), each voxel's light is taken apart into soot and lines
-/// (unmixing.h), and nothing is solved together. An emitter that isn't told is read as grey, and what soot
-/// would tell is part of each voxel's error.
+/// (unmixing.h), and nothing is solved together. Without lines errors hold what one more voxel's blend of hot
+/// and cold would change. Soot's errors hold what a constant E(m) would change. An emitter that isn't told is
+/// read as grey, and what soot would tell is part of each voxel's error.
 TemperatureField temperature_of(const Scene& scene, const Reconstruction& done, const VolumeErrors& errors,
                                 const CameraResponse& response, std::optional<Emitter> emitter,
                                 const SolveOptions& options = {}, const Elapsed& elapsed = {},

@@ -105,6 +105,11 @@ Status check_place(const Scene& scene) {
 
 }  // namespace
 
+std::string_view name(ViewRole role) {
+  if (role == ViewRole::input) return "input";
+  return role == ViewRole::held_out ? "held_out" : "left_out";
+}
+
 Status check_scene(const Scene& scene) {
   if (std::none_of(scene.views.begin(), scene.views.end(),
                    [](const View& v) { return v.role == ViewRole::input; }))

@@ -7,6 +7,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "base/quantity.h"
@@ -18,7 +19,13 @@ namespace emberlock::recon {
 
 struct CameraResponse;
 
-enum class ViewRole { input, held_out };
+enum class ViewRole {
+  input,     ///< the volume is fitted to it
+  held_out,  ///< judges the volume
+  left_out,  ///< does neither, as its picture shows nothing of the flame (pipeline/blind_views.h)
+};
+/// "input", "held_out" or "left_out".
+std::string_view name(ViewRole role);
 
 /// View::bounds of a pixel that is left out, and whose image is black: any light explains it, it is in no
 /// error, and it carves nothing.

@@ -97,6 +97,53 @@ TEST_F(MeasureCommandSlow, SaysWhatABallRadiates) {
   EXPECT_THAT(html, HasSubstr("power that the sphere catches"));
 }
 
+/// A thin ball's emission and temperature tell where it absorbs; an even extinction that was given doesn't.
+TEST_F(MeasureCommandTest, AThinBallRadiatesByItsOwnAbsorption) {
+  constexpr int kPoints = 13;
+  for (const float absorption : {0.1F, 0.2F, 0.4F})
+    for (const float given : {0.0F, 1.0F, 10.0F}) {
+      recon::Volume volume;
+      volume.grid = {{-0.06F, -0.06F, -0.06F}, 0.12F / (kPoints - 1), kPoints, kPoints, kPoints};
+      volume.emission.assign(3 * volume.grid.size(), 1);
+      if (given > 0) volume.extinction.assign(volume.grid.size(), given);
+      std::vector<float> kelvin(volume.grid.size());
+      std::vector<float> sigma(volume.grid.size());
+      std::vector<float> absorbs(volume.grid.size());
+      std::vector<float> falls(volume.grid.size());
+      double filled = 0;  // voxels' worth of absorption
+      for (int k = 0; k < kPoints; ++k)
+        for (int j = 0; j < kPoints; ++j)
+          for (int i = 0; i < kPoints; ++i) {
+            if (std::hypot(i - 6, j - 6, k - 6) > 4) continue;
+            const std::size_t p = volume.grid.index(i, j, k);
+            kelvin[p] = 1500;
+            sigma[p] = 15;
+            absorbs[p] = absorption;
+            falls[p] = 0.1F * absorption;
+            ++filled;
+          }
+      ASSERT_TRUE(recon::write_volume(volume, root_ / "thin.vdb",
+                                      {{"temperature", "K", kelvin},
+                                       {"temperature_sigma", "K", sigma},
+                                       {"absorption", "1/m", absorbs},
+                                       {"absorption_sigma", "1/m", falls}})
+                      .ok());
+      const auto result = run({(root_ / "thin.vdb").string(), "--out", (root_ / "out").string()});
+      ASSERT_EQ(result.exit_code, 0) << result.err;
+      std::ifstream in(root_ / "out" / "measures.csv");
+      std::string cell;
+      std::getline(in, cell);
+      std::getline(in, cell, ',');
+      std::getline(in, cell, ',');
+      const double expected = 4 * static_cast<double>(absorption) * filled * std::pow(0.01, 3) *
+                              5.670374419e-8 * std::pow(1500, 4);
+      EXPECT_NEAR(std::stod(cell), expected, 0.1 * expected);
+      std::getline(in, cell, ',');
+      EXPECT_NEAR(std::stod(cell), (1 - 0.9 * std::pow(1.01, 4)) * expected, 0.015 * expected)
+          << "hotter, but less of it";
+    }
+}
+
 TEST_F(MeasureCommandTest, SaysWhatIsMissing) {
   write("colour.vdb", false);
   write("thin.vdb", true, false);

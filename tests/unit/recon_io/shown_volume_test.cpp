@@ -2,6 +2,7 @@
 #include "recon/pipeline/shown_volume.h"
 
 #include <cmath>
+#include <cstdint>
 
 #include <OpenEXR/ImfFrameBuffer.h>
 #include <OpenEXR/ImfHeader.h>
@@ -11,6 +12,7 @@
 #include "recon/calibrate/camera_path.h"
 #include "recon/export/exr_file.h"
 #include "recon/export/volume_file.h"
+#include "recon/render/render.h"
 #include "tests/support/key_points.h"
 #include "tests/support/recording.h"
 #include "tests/support/results.h"
@@ -73,6 +75,56 @@ TEST(ShownVolume, TemperaturesAreThoseOfTheLightAlongTheRay) {
   // The upper half is nearer: of the light 1 - e^-1 of 1 - e^-2.
   const double upper = (1 - std::exp(-1)) / (1 - std::exp(-2));
   EXPECT_NEAR(views[1][pixel(32, 24)], 1500 + 300 * upper, 6);
+}
+
+/// Light and extinction at the key points of a medium's voxels, whose values have nothing to do with each
+/// other.
+Volume within(const Hull& medium, std::uint64_t seed, bool absorbs) {
+  Volume v{medium.grid, std::vector<float>(3 * medium.grid.size()), {}, medium.inside};
+  if (absorbs) v.extinction.resize(medium.grid.size());
+  std::size_t voxel = 0;
+  each_point(voxels_of(medium.grid), [&](int i, int j, int k) {
+    if (medium.inside[voxel++] == 0) return;
+    for (int c = 0; c < 8; ++c) {
+      const std::size_t p = medium.grid.index(i + (c & 1), j + (c >> 1 & 1), k + (c >> 2));
+      for (std::size_t n = 0; n < 3; ++n)
+        v.emission[3 * p + n] = static_cast<float>(kSource * random_uniform(seed, n, p));
+      if (absorbs) v.extinction[p] = static_cast<float>(40 * random_uniform(seed, 3, p));
+    }
+  });
+  return v;
+}
+
+TEST(ShownVolume, IsWhatWasJudgedAndNothingBeyondItsMedium) {
+  const test::TempFolder folder;
+  const CameraModel camera = looking({0.4, 0.1, 0.05}, {0, 0, 0}, Eigen::Vector3d::UnitZ(), kSize);
+  for (int n = 0; n < 20; ++n) {
+    const Hull medium = medium_with_holes(cube_grid(0.12, 3 + n), 0.05 * n + 0.04, n % 4 == 0 ? 1 : 3);
+    const Volume judged = within(medium, static_cast<std::uint64_t>(n), n % 2 == 0);
+    ASSERT_TRUE(write_volume(judged, folder / "volume.vdb").ok());
+    const ShownVolume shown = value_of(read_shown_volume(folder / "volume.vdb"));
+    EXPECT_EQ(shown.volume.inside, judged.inside);
+    Effects effects;
+    if (!judged.extinction.empty()) effects.extinction.model = Extinction::Model::field;
+    EXPECT_EQ(LightViews(shown.volume).of({&camera})[0].light.rgb,
+              render_view(judged, medium, effects, camera).rgb);
+    // All light is that of the medium's voxels, for programs that interpolate beyond it too.
+    const SharedVolume shared = value_of(read_shared_volume(folder / "volume.vdb"));
+    EXPECT_EQ(shared.find("medium"), nullptr);
+    double light = 0;
+    std::size_t voxel = 0;
+    each_point(voxels_of(medium.grid), [&](int i, int j, int k) {
+      if (medium.inside[voxel++] == 0) return;
+      for (int c = 0; c < 8; ++c)
+        light += static_cast<double>(
+                     judged.emission[3 * medium.grid.index(i + (c & 1), j + (c >> 1 & 1), k + (c >> 2))]) /
+                 8;
+    });
+    double sum = 0;
+    for (std::size_t p = 0; p < medium.grid.size(); ++p)
+      sum += static_cast<double>(shared.find("emission")->values[3 * p]);
+    EXPECT_NEAR(sum, light, 1e-5 * light);
+  }
 }
 
 TEST(ShownVolume, IsReadFromAResultOrItsFile) {

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <numbers>
 
 #include "smear_sync/detect/kernels.h"
@@ -27,6 +28,21 @@ void add_blocks(const Plane& plane, int left, int top, int length, std::vector<f
   }
   for (std::size_t i = 1; i < static_cast<std::size_t>(count); ++i)
     differences.push_back(sums[i] - sums[i - 1]);
+}
+
+double share_of_equals(const std::vector<float>& differences) {
+  const auto equal = std::count(differences.begin(), differences.end(), 0.0F);
+  return static_cast<double>(equal) / static_cast<double>(std::max<std::size_t>(1, differences.size()));
+}
+
+/// The smallest difference between pixels, in grey levels of the frame; 1 where there is none.
+double step_of(const Plane& plane, const std::vector<float>& differences) {
+  float smallest = std::numeric_limits<float>::max();
+  for (const float d : differences) {
+    if (d != 0) smallest = std::min(smallest, std::abs(d));
+  }
+  if (smallest == std::numeric_limits<float>::max()) return 1;
+  return std::clamp(smallest * plane.level, 1.0, std::max(1.0, plane.view.layout.white() / 255.0));
 }
 
 }  // namespace
@@ -57,27 +73,25 @@ Background measure_background(const Plane& plane, int runs) {
   }
   Background background;
   background.level = static_cast<double>(median(few));
-  const auto limit = static_cast<float>(4 * std::max(0.5, robust_scale(few_differences)));
+  const double equals = share_of_equals(differences);
+  background.flat = equals > 0.6;
+  background.step = step_of(plane, differences);
+  const auto limit = static_cast<float>(4 * std::max(0.5 * background.step, robust_scale(few_differences)));
   double sum = 0;
   int count = 0;
-  int equal = 0;
   for (const float d : differences) {
     const bool near = std::abs(d) <= limit;
     sum += near ? static_cast<double>(d) * static_cast<double>(d) : 0;
     count += near ? 1 : 0;
-    equal += d == 0 ? 1 : 0;
   }
   const double variance = count > 0 ? sum / (2 * count) : 0;
-  background.noise = std::max(plane.rounding, std::sqrt(variance));
+  background.noise = std::max(plane.rounding * background.step, std::sqrt(variance));
   // Compression makes more neighbours equal than Gaussian noise of the same variance would: quantisation
   // leaves most neighbours equal, or removes the fine noise and leaves the coarse, or leaves it in some
   // blocks only.
   const auto pairs = static_cast<double>(std::max<std::size_t>(1, differences.size()));
-  const double equals = equal / pairs;
-  background.flat = equals > 0.6;
-  const double gaussian = 1 / (std::sqrt(4 * std::numbers::pi) * background.noise);
-  const bool uneven = plane.view.layout.bit_depth == 8 &&
-                      equals - gaussian > std::max(0.25 * gaussian, 6 * std::sqrt(gaussian / pairs));
+  const double gaussian = background.step / (std::sqrt(4 * std::numbers::pi) * background.noise);
+  const bool uneven = equals - gaussian > std::max(0.25 * gaussian, 6 * std::sqrt(gaussian / pairs));
   double coarse = 0;
   int blocks_used = 0;
   for (const float d : blocks) {
@@ -90,6 +104,14 @@ Background measure_background(const Plane& plane, int runs) {
   constexpr double kCoarse = 1.25;  // six times its error for white noise
   background.compressed = background.flat || uneven || background.grain > kCoarse;
   return background;
+}
+
+void set_saturation(const Plane& plane, double saturation, Background& background) {
+  background.saturation = saturation;
+  background.grey = 255 * kNearlyWhite / saturation;
+  if (!background.compressed) return;
+  background.step = std::max(background.step, plane.level / background.grey);
+  background.noise = std::max(background.noise, plane.rounding * background.step);
 }
 
 std::vector<float> column_medians(const Patch& patch, Field field) {

@@ -14,7 +14,11 @@ struct Background {
   double noise = 0;       ///< standard deviation of a pixel, at least that of rounding
   double saturation = 0;  ///< from here on a pixel counts as saturated: just below white, or below the
                           ///< plateau of a signal that was clipped at fewer bits (12 bits in a 16-bit file)
-  double grain = 1;       ///< noise of a sum of 6 x 6 neighbours, relative to that of independent pixels
+  double step = 1;        ///< quantisation step of the signal, in grey levels of the frame: more than 1 where
+                          ///< fewer bits lie in a deeper file
+  double grey = 1;   ///< 1/255 of white per sample of the plane: a codec's errors are in proportion to white,
+                     ///< whatever the depth of the file
+  double grain = 1;  ///< noise of a sum of 6 x 6 neighbours, relative to that of independent pixels
   bool compressed =
       false;  ///< quantised by a compressor (or noiseless): the noise doesn't indicate the size of artefacts
   bool flat = false;  ///< compressed so strongly that no noise is left
@@ -22,6 +26,11 @@ struct Background {
 /// Measured in runs of 36 pixels all over the frame. Doesn't set `saturation`, which needs the brightest
 /// rows.
 Background measure_background(const Plane& plane, int runs = 64);
+/// Sets `saturation`. In a compressed frame step and noise become at least those of 8 bits: the codec's
+/// errors hide finer ones.
+void set_saturation(const Plane& plane, double saturation, Background& background);
+/// The part of white from which on a sample counts as saturated.
+constexpr double kNearlyWhite = 0.98;
 
 /// Every row, or one field of an interlaced frame.
 struct Field {

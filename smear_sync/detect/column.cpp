@@ -118,7 +118,7 @@ void find_line(const Column& c, ColumnReading& reading) {
   const double rows = std::max(1.0, c.patch.height * (1 - reading.hidden));
   const double error =
       std::hypot(c.noise / std::sqrt(rows * columns_inside), spread / std::sqrt(columns_inside));
-  if (reading.line_level < std::max(6 * error, 0.25 / c.sample_level)) return;
+  if (reading.line_level < std::max(6 * error, 0.25 * c.step)) return;
   constexpr int kBlock = 16;
   int blocks = 0;
   int bright = 0;

@@ -333,13 +333,16 @@ Column level_column(const Plane& plane, const Background& background, const Lamp
   c.x = lamp.x - c.patch.x0;
   c.y = lamp.y;
   c.saturation = background.saturation;
-  c.sample_level = plane.level;
-  c.eight_bits = plane.view.layout.bit_depth == 8;
+  c.sample_level = background.grey;
+  constexpr double kAbout = 0.99;
+  c.eight_bits = background.step * background.grey > kAbout * plane.level;
+  c.step = background.step / plane.level;
   c.compressed = background.compressed;
   c.flat = background.flat;
   c.noise = background.noise;
   const double bright = 6 * c.noise;
-  const std::vector<char> bright_rows = subtract_levels(c, std::max(background.noise, 0.5), bright);
+  const std::vector<char> bright_rows =
+      subtract_levels(c, std::max(background.noise, 0.5 * background.step), bright);
   mend_hot_pixels(c, bright, bright_rows);
   subtract_halo(c);
   hide_bloom(c);

@@ -21,8 +21,9 @@ struct Column {
   int half_width = 0;        ///< of a lane
   double noise = 0;          ///< of a pixel in the lamp's lane
   double saturation = 0;
-  double sample_level = 1;  ///< grey levels per sample
-  bool eight_bits = false;
+  double sample_level = 1;  ///< levels of an 8-bit frame per sample
+  double step = 1;          ///< quantisation step of the signal, samples
+  bool eight_bits = false;  ///< the signal has no more bits
   bool compressed = false;
   bool flat = false;         ///< no noise is left
   std::vector<char> hidden;  ///< rows in which a dot isn't visible

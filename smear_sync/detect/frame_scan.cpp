@@ -7,16 +7,18 @@
 namespace emberlock::smear::detail {
 namespace {
 
-/// Just below white, or below the plateau of a signal that was clipped at fewer bits.
-double saturation_of(const Plane& plane) {
-  constexpr double kNearly = 0.98;
-  if (plane.view.layout.bit_depth == 8) return kNearly * plane.white;
+/// Just below white, or below the plateau of a signal that was clipped at fewer bits. A signal of coarse
+/// steps has plateaus anyway.
+double saturation_of(const Plane& plane, double step) {
+  constexpr double kPlateauDepth = 0.002;  // of the peak
+  if (plane.view.layout.bit_depth == 8) return kNearlyWhite * plane.white;
   const RowStep rows = every_lamp(plane);
   const double peak = find_bright(plane, plane.white, rows).peak;
-  if (peak >= kNearly * plane.white) return kNearly * plane.white;
+  if (peak >= kNearlyWhite * plane.white || step > kPlateauDepth * peak * plane.level)
+    return kNearlyWhite * plane.white;
   constexpr int kPlateau = 12;  // pixels
-  const int count = find_bright(plane, 0.998 * peak, rows).pixels;
-  return kNearly * (count * rows.step >= kPlateau ? peak : plane.white);
+  const int count = find_bright(plane, (1 - kPlateauDepth) * peak, rows).pixels;
+  return kNearlyWhite * (count * rows.step >= kPlateau ? peak : plane.white);
 }
 
 /// The background from few samples, averaged with the previous one; nullopt if it has changed.
@@ -24,7 +26,8 @@ std::optional<Background> still_the_same(const Plane& plane, const Background& b
   constexpr int kRuns = 16;
   constexpr double kNew = 0.1;
   constexpr double kOther = 1.5;
-  const Background now = measure_background(plane, kRuns);
+  Background now = measure_background(plane, kRuns);
+  set_saturation(plane, before.saturation, now);
   if (now.noise > kOther * before.noise || before.noise > kOther * now.noise) return std::nullopt;
   if (std::abs(now.level - before.level) > 3 * before.noise) return std::nullopt;
   Background background = before;
@@ -78,7 +81,7 @@ bool alone(const Plane& plane, const Background& background, const Lamp& lamp, u
 FrameScan scan_frame(const Plane& plane, const DetectOptions& options) {
   FrameScan scan;
   scan.background = measure_background(plane);
-  scan.background.saturation = saturation_of(plane);
+  set_saturation(plane, saturation_of(plane, scan.background.step), scan.background);
   const double threshold = scan.background.level + lamp_gate(scan.background, options);
   scan.search = find_lamps(plane, scan.background, find_bright(plane, threshold, every_lamp(plane)), options);
   if (scan.search.lamps.size() == 1)

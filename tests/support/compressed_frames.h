@@ -6,6 +6,8 @@ extern "C" {
 #include <libavutil/opt.h>
 }
 
+#include <algorithm>
+#include <cstdint>
 #include <cstring>
 #include <stdexcept>
 #include <string>
@@ -16,7 +18,8 @@ extern "C" {
 #include "base/image.h"
 #include "session/av.h"
 
-// What cameras' compressors make of 8-bit grey frames, by the libraries themselves, in memory.
+// What cameras' compressors make of 8-bit grey frames, by the libraries themselves, in memory; and the same
+// frames in deeper files.
 namespace emberlock::test {
 
 /// What an 8-bit JPEG file of this quality brings back.
@@ -125,6 +128,65 @@ inline std::vector<Image> through_h264(const std::vector<Image>& film, int crf) 
   h264::Codec codec(film.front().layout().size, crf);
   for (const Image& image : film) codec.feed(image);
   return codec.finish();
+}
+
+/// The same signal in more bits, as a converter stores it: 0 and white stay 0 and white.
+inline Image deepened(const Image& image, int bit_depth) {
+  Image out(ImageLayout{image.layout().size, PixelFormat::gray16, bit_depth});
+  const int white = out.layout().white();
+  for (int y = 0; y < image.layout().size.height; ++y) {
+    for (int x = 0; x < image.layout().size.width; ++x)
+      out.row_as<std::uint16_t>(y)[x] =
+          static_cast<std::uint16_t>((image.row_as<std::uint8_t>(y)[x] * white + 127) / 255);
+  }
+  return out;
+}
+
+/// What 10-bit ProRes brings back of an 8-bit frame, with 16 bits, as videos of limited range are read.
+inline Image through_prores(const Image& image) {
+  const ImageSize size = image.layout().size;
+  const AVCodec* const codec = avcodec_find_encoder_by_name("prores_ks");
+  if (codec == nullptr) throw std::runtime_error("libavcodec has no ProRes");
+  session::AvPtr<AVCodecContext> encoder(avcodec_alloc_context3(codec));
+  encoder->width = size.width;
+  encoder->height = size.height;
+  encoder->pix_fmt = AV_PIX_FMT_YUV422P10LE;
+  encoder->time_base = {1, 24};
+  encoder->thread_count = 1;
+  h264::check(avcodec_open2(encoder.get(), codec, nullptr), "the encoder doesn't open");
+  session::AvPtr<AVFrame> frame(av_frame_alloc());
+  frame->format = encoder->pix_fmt;
+  frame->width = size.width;
+  frame->height = size.height;
+  h264::check(av_frame_get_buffer(frame.get(), 0), "no memory");
+  const auto row_of = [&](int plane, int y) {
+    return reinterpret_cast<std::uint16_t*>(frame->data[plane] + std::ptrdiff_t{y} * frame->linesize[plane]);
+  };
+  constexpr int kBlack = 64;
+  constexpr int kRange = 876;
+  for (int y = 0; y < size.height; ++y) {
+    for (int x = 0; x < size.width; ++x)
+      row_of(0, y)[x] =
+          static_cast<std::uint16_t>(kBlack + (image.row_as<std::uint8_t>(y)[x] * kRange + 127) / 255);
+    for (const int plane : {1, 2}) std::fill_n(row_of(plane, y), size.width / 2, std::uint16_t{512});
+  }
+  session::AvPtr<AVPacket> packet(av_packet_alloc());
+  h264::check(avcodec_send_frame(encoder.get(), frame.get()), "a frame isn't taken");
+  h264::check(avcodec_receive_packet(encoder.get(), packet.get()), "a frame isn't coded");
+  session::AvPtr<AVCodecContext> decoder(avcodec_alloc_context3(avcodec_find_decoder(AV_CODEC_ID_PRORES)));
+  decoder->thread_count = 1;
+  decoder->codec_tag = MKTAG('a', 'p', 'c', 'h');
+  h264::check(avcodec_open2(decoder.get(), nullptr, nullptr), "the decoder doesn't open");
+  h264::check(avcodec_send_packet(decoder.get(), packet.get()), "a packet isn't taken");
+  h264::check(avcodec_receive_frame(decoder.get(), frame.get()), "no frame");
+  Image out(ImageLayout{size, PixelFormat::gray16, 16});
+  for (int y = 0; y < size.height; ++y) {
+    for (int x = 0; x < size.width; ++x) {
+      const int above = std::clamp(row_of(0, y)[x] - kBlack, 0, kRange);
+      out.row_as<std::uint16_t>(y)[x] = static_cast<std::uint16_t>((above * 65535 + kRange / 2) / kRange);
+    }
+  }
+  return out;
 }
 
 }  // namespace emberlock::test

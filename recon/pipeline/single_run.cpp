@@ -197,6 +197,10 @@ Outcome finish(const Task& task, const PreparedScene& solved, const SolveOptions
   result.discarded = done.discarded;
   result.trace_sample = done.trace_sample;
   done.volume.inside = done.hull.inside;
+  // The solver gives key points on the border their voxels' share of an even extinction.
+  if (done.effects.extinction.model == Extinction::Model::constant)
+    for (float& sigma : done.volume.extinction)
+      if (sigma > 0) sigma = static_cast<float>(done.effects.extinction.value.value());
   outcome.reconstruction = std::move(done);
   tell(progress, 1, "done");
   return outcome;

@@ -9,7 +9,7 @@
 #include "recon/adjust/choose_light.h"
 #include "recon/adjust/find_extinction.h"
 #include "recon/adjust/find_motion.h"
-#include "recon/adjust/left_out_views.h"
+#include "recon/adjust/guard.h"
 #include "recon/adjust/predict_effects.h"
 #include "recon/effects/motion.h"
 #include "recon/views/picture_clues.h"
@@ -17,73 +17,74 @@
 namespace emberlock::recon {
 namespace {
 
-std::string explain(const FoundExtinction& found) {
-  const double even = found.extinction.value.value();
-  const double soot = found.extinction.soot.value();
-  if (soot <= 0)
-    return fmt::format("an even {:.3g} / m fits the pictures best, to {:.3g} grey levels on a coarse grid",
-                       even, found.error);
-  if (even <= 0)
-    return fmt::format("{:.3g} / m like soot fits the pictures best, to {:.3g} grey levels on a coarse grid",
-                       soot, found.error);
-  return fmt::format("{:.3g} / m even and {:.3g} / m like soot fit the pictures best", even, soot);
+std::string explain(const EstimatedExtinction& estimate) {
+  const double even = estimate.extinction.value.value();
+  const double soot = estimate.extinction.soot.value();
+  if (estimate.error <= 0) return "no time is left to estimate it by cross-validation";
+  const std::string what = even + soot <= 0 ? "none"
+                           : soot <= 0      ? fmt::format("an even {:.3g} / m", even)
+                           : even <= 0      ? fmt::format("{:.3g} / m like soot", soot)
+                                       : fmt::format("{:.3g} / m even and {:.3g} / m like soot", even, soot);
+  return fmt::format(
+      "{} shows pixels and views that are left out of a coarse fit best, to {:.3g} grey levels", what,
+      estimate.error);
 }
 
-/// A hull of voxels half as large as those that the views were left out on, or two thirds as large where the
-/// run has them; nothing where pictures don't tell so small ones apart.
-std::optional<Hull> closer_hull(const SolverSetup& setup, const Scene& linear,
-                                const std::vector<FlameMask>& masks, const Grid& coarse) {
-  constexpr double kPixelsPerVoxel = 1.3;
-  const Hull own = coarsen_to(setup.hull, LeftOutViews::kCloser.voxels);
-  const bool is_finer = own.grid.edge < 0.7F * coarse.edge;
-  const Grid twice{{coarse.origin[0], coarse.origin[1], coarse.origin[2]},
-                   coarse.edge / 2,
-                   2 * coarse.nx - 1,
-                   2 * coarse.ny - 1,
-                   2 * coarse.nz - 1};
-  if (pixels_per_voxel(setup, is_finer ? own.grid : twice) < kPixelsPerVoxel) return {};
-  if (is_finer) return own;
-  auto hull = carve(linear, masks, twice, setup.options.compute);
-  return hull.ok() ? std::optional<Hull>(std::move(*hull)) : std::nullopt;
-}
+/// Estimates the extinction on a grid of its own and makes the report's line of it.
+class ExtinctionChoice {
+ public:
+  ExtinctionChoice(const EffectRequest& request, const Extinction& known)
+      : request_(request), known_(known) {}
 
-/// What views that are left out of the fit say of an extinction that was found between the pixels of all
-/// views. One that lowers their error by a little may explain what the grid is too coarse to show: of a
-/// simulated candle 8 %, after which its emission was off by a half instead of a tenth. Then a closer look
-/// decides.
-struct ShownFromElsewhere {
-  double with = 0;  ///< grey levels
-  double without = 0;
-  bool better = true;
-  bool closer = false;  ///< on the finer grid
+  void estimate(const SolverSetup& probing, const Elapsed& elapsed) {
+    const bool by_hand = request_.fixed.has_value();
+    found_ = {known_};
+    if (!by_hand || is_open()) found_ = find_extinction(probing, by_hand, elapsed);
+  }
+  [[nodiscard]] const Extinction& found() const { return found_.extinction; }
+  /// `change`: of the pictures by what was found, grey levels.
+  Extinction decide(double change) {
+    // The simpler model stands unless it is clearly worse: simulated candles that hardly absorb gain 0.02.
+    constexpr double kLeastGain = 0.05;
+    report_.predicted_change = change;
+    const bool absorbs = found_.extinction.model != Extinction::Model::none;
+    report_.on = absorbs;
+    report_.reason = "set by hand";
+    if (request_.fixed && is_open()) report_.reason += ": " + explain(found_);
+    if (request_.fixed) return found_.extinction;
+    report_.reason = explain(found_);
+    if (!absorbs) return {};
+    const bool is_validated = found_.error < (1 - kLeastGain) * found_.error_of_none;
+    report_.on = is_validated && change >= request_.tolerance;
+    if (!is_validated)
+      report_.reason +=
+          fmt::format(", and to {:.3g} without it, which is too little to believe it", found_.error_of_none);
+    else if (!report_.on)
+      report_.reason +=
+          fmt::format(", but changes the pictures by less than {:.2g} grey levels", request_.tolerance);
+    if (!report_.on) found_.alternatives = {found_.extinction};
+    return report_.on ? found_.extinction : Extinction{};
+  }
+  [[nodiscard]] EffectReport report(Seconds took) const {
+    EffectReport report = report_;
+    report.seconds = took;
+    return report;
+  }
+  /// After decide(): extinctions that validation hardly tells from its result.
+  [[nodiscard]] const std::vector<Extinction>& alternatives() const { return found_.alternatives; }
+
+ private:
+  /// A field whose scale the user leaves open; under a light the density is estimated with the light.
+  [[nodiscard]] bool is_open() const {
+    return known_.model == Extinction::Model::field && known_.value.value() + known_.soot.value() <= 0 &&
+           request_.fixed->light.source == Light::Source::none;
+  }
+
+  const EffectRequest& request_;
+  Extinction known_;
+  EstimatedExtinction found_;
+  EffectReport report_{"extinction", false, 0, {}, {}};
 };
-/// Where the budget doesn't allow to look at both, the extinction is believed.
-ShownFromElsewhere show_from_elsewhere(const SolverSetup& setup, const Scene& linear,
-                                       const std::vector<FlameMask>& masks, const Extinction& found,
-                                       const Elapsed& elapsed) {
-  constexpr double kLeastGain = 0.01;
-  constexpr double kPlainGain = 0.2;
-  constexpr double kLeastCloserGain = 0.05;  // one that is there gains more there than before
-  const auto late = [&] { return is_spent(0.4, setup.options, elapsed); };
-  if (found.model == Extinction::Model::none) return {};
-  const LeftOutViews views(setup, setup.hull);
-  if (!views.any()) return {};
-  const FoundSmoothness with = find_smoothness(views, found, late);
-  if (late()) return {};
-  const FoundSmoothness without = find_smoothness(views, {}, late);
-  const auto shown = [](double there, double not_there, double least_gain) {
-    return ShownFromElsewhere{there, not_there, there < (1 - least_gain) * not_there};
-  };
-  const ShownFromElsewhere first = shown(with.error, without.error, kLeastGain);
-  if (!first.better || with.error < (1 - kPlainGain) * without.error || late()) return first;
-  const std::optional<Hull> hull = closer_hull(setup, linear, masks, views.grid());
-  if (!hull) return first;
-  const LeftOutViews closer(setup, *hull, LeftOutViews::kCloser);
-  ShownFromElsewhere second =
-      shown(closer.error(found, with.value), closer.error({}, without.value), kLeastCloserGain);
-  second.closer = true;
-  return second;
-}
 
 /// Decides on the motion, in two halves: where it rises before anything else is known, and the rest once the
 /// extinction is.
@@ -237,40 +238,24 @@ Result<EffectChoice> choose_effects(const PreparedScene& scene, const Grid& grid
     setup.boxes.push_back(boxes[v]);
   }
 
-  const FoundExtinction found =
-      request.fixed ? try_extinction(setup, known.extinction) : find_extinction(setup, elapsed);
+  EMBERLOCK_ASSIGN_OR_RETURN(const Hull probe, carve_probe(setup, linear, masks));
+  ExtinctionChoice extinction(request, known.extinction);
+  extinction.estimate({setup.views, setup.boxes, probe, known, options, pool}, elapsed);
+  const bool absorbs = extinction.found().model != Extinction::Model::none;
+  const CoarseSolution found = try_extinction(setup, extinction.found());
   const double finer = static_cast<double>(found.hull.grid.edge) / static_cast<double>(grid.edge);
   const CoarseFlame flame{linear, masks, found.volume, found.hull, finer};
-  EffectReport report{"extinction", false, 0, {}, {}};
-  if (found.extinction.model != Extinction::Model::none) {
+  double predicted_change = 0;
+  if (absorbs) {
     Effects absorbing;
     absorbing.extinction.model = Extinction::Model::field;
     const CoarsePictures pictures(flame, options.compute);
-    report.predicted_change = change(pictures(absorbing), pictures({}));
+    predicted_change = change(pictures(absorbing), pictures({}));
   }
   Effects decided = known;
-  if (request.fixed) {
-    report.on = known.extinction.model != Extinction::Model::none;
-    report.reason = "set by hand";
-  } else {
-    const ShownFromElsewhere shown = show_from_elsewhere(setup, linear, masks, found.extinction, elapsed);
-    report.on = report.predicted_change >= request.tolerance && shown.better;
-    report.reason =
-        !shown.better
-            ? fmt::format(
-                  "{}, but {}views that are left out of the fit are shown to {:.3g} grey levels with it "
-                  "and to {:.3g} without{}",
-                  explain(found), shown.closer ? "on a finer grid " : "", shown.with, shown.without,
-                  shown.with < shown.without ? ", which is too little to believe it" : "")
-        : report.on
-            ? explain(found)
-            : fmt::format("the best fit, {:.3g} / m, changes the pictures by less than {:.2g} grey levels",
-                          found.extinction.value.value() + found.extinction.soot.value(), request.tolerance);
-    decided.extinction = report.on ? found.extinction : Extinction{};
-  }
-  report.seconds = (elapsed ? elapsed() : Seconds(0)) - start;
-  LightChoice light = choose_light(setup, decided.extinction,
-                                   found.extinction.model != Extinction::Model::none, request, elapsed);
+  decided.extinction = extinction.decide(predicted_change);
+  EffectReport report = extinction.report((elapsed ? elapsed() : Seconds(0)) - start);
+  LightChoice light = choose_light(setup, decided.extinction, absorbs, request, elapsed);
   decided.light = light.light;
 
   EMBERLOCK_ASSIGN_OR_RETURN(EffectChoice choice,

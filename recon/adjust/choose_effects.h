@@ -13,9 +13,10 @@ PreparedScene under_known_effects(const PreparedScene& filmed, const EffectReque
                                   const ComputeOptions& compute = {});
 
 /// Decides which effects the pictures of a scene that is under_known_effects() call for. With `request.fixed`
-/// it takes those and only predicts their change. Otherwise the extinction is found by a global search: cold
-/// solves on a coarse grid from a fraction of the pixels, judged on held-out pixels of the input views, then
-/// refined by a parabola; an effect whose predicted change lies below the tolerance is off. Errors: a gamma
+/// it takes those and only predicts their change, but for the scale of an extinction field, which it
+/// estimates. Otherwise the extinction is estimated by cross-validation on a grid of its own
+/// (find_extinction.h), so that it doesn't depend on `grid`; it stays off unless it lowers the validation
+/// error by a twentieth. An effect whose predicted change lies below the tolerance is off. Errors: a gamma
 /// for pictures that are linearised; a device that can't run; no hull.
 Result<EffectChoice> choose_effects(const PreparedScene& scene, const Grid& grid,
                                     const EffectRequest& request, const SolveOptions& options,

@@ -10,13 +10,19 @@
 namespace emberlock::recon {
 namespace {
 
-// Over the pixels: emission alone, then emission and extinction together; without extinction to find, both.
-constexpr int kEmissionPasses = 2;
-constexpr int kJointPasses = 4;
+// Emission only, then emission and extinction together; without extinction to find, both.
+constexpr int kEmissionSteps = 8;
+constexpr int kJointSteps = 16;
 constexpr int kLitPasses = 16;  // of a density, whose light is found with it
 
-ColdSolve finish(Descent& descent, int passes) {
-  for (int p = 0; p < passes; ++p) descent.pass();
+/// Candidates are compared across levels, whose numbers of subsets differ: a level of fewer subsets needs
+/// more passes for as many steps.
+void take_steps(Descent& descent, const Level& level, int steps) {
+  for (int taken = 0; taken < steps; taken += level.subsets) descent.pass();
+}
+
+ColdSolve finish(Descent& descent, const Level& level, int steps) {
+  take_steps(descent, level, steps);
   descent.show_validation();
   const double error = descent.validation_error();
   if (!std::isfinite(error)) throw Diverged(error, error);
@@ -41,25 +47,25 @@ ColdSolve solve_level(const SolverSetup& setup, const Level& level, const Extinc
   if (extinction.model == Extinction::Model::none) {
     optics.absorb = Absorb::nothing;
     Descent descent(level, optics, setup);
-    return finish(descent, kEmissionPasses + kJointPasses);
+    return finish(descent, level, kEmissionSteps + kJointSteps);
   }
   if (extinction.model == Extinction::Model::constant) {
     SolverSetup even = setup;
     even.effects.extinction = extinction;
     Descent descent(level, even.optics(problem.grid()), even);
-    return finish(descent, kEmissionPasses + kJointPasses);
+    return finish(descent, level, kEmissionSteps + kJointSteps);
   }
   optics.absorb = Absorb::field;
   std::optional<Descent> even;
   if (extinction.soot.value() > 0) {  // is spread by the light that there is
     even.emplace(level, optics, setup, DescentStart{nullptr, &extinction});
-    for (int p = 0; p < kEmissionPasses; ++p) even->pass();
+    take_steps(*even, level, kEmissionSteps);
   }
   Descent descent(level, optics, setup, {even ? &even->engine() : nullptr, &extinction});
   even.reset();
-  for (int p = 0; p < kEmissionPasses; ++p) descent.pass();
+  take_steps(descent, level, kEmissionSteps);
   descent.release_extinction();
-  return finish(descent, kJointPasses);
+  return finish(descent, level, kJointSteps);
 }
 
 }  // namespace

@@ -7,7 +7,7 @@
 
 namespace emberlock::recon {
 
-/// The result of a few passes on a level, starting from darkness, for comparing candidates.
+/// The result of a fixed number of steps on a level, from zero initialisation, for comparing candidates.
 struct ColdSolve {
   double error = 0;  ///< RMS over the level's held-out pixels, grey levels; infinite if it diverged
   std::shared_ptr<const Engine> engine;  ///< holds the solution; null if it diverged

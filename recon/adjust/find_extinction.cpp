@@ -4,60 +4,102 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <memory>
+#include <limits>
 #include <mutex>
-#include <optional>
 
 #include "recon/adjust/cold_solve.h"
 
 namespace emberlock::recon {
 namespace {
 
-constexpr int kCoarse = 64;           // voxels along the longest side, at most
+constexpr int kCoarse = 64;           // voxels along the longest side, at most, of a coarse solution
 constexpr std::size_t kRays = 30000;  // about as many pixels of the flames' boxes are looked at
+// Optical depths of the mean ray: a thinner medium hardly changes the pictures, nothing is seen through a
+// thicker.
+constexpr double kThinnest = 1.0 / 16;
+constexpr double kThickest = 4;
 
-struct Candidate {
+struct ScoredExtinction {
   Extinction extinction;
   double error = 0;
-  std::shared_ptr<const Engine> engine;
 };
 
-Extinction guess(PerMeter even, PerMeter soot) {
-  if (even.value() + soot.value() <= 0) return {};
-  return {Extinction::Model::field, even, soot};
+bool scores_better(const ScoredExtinction& a, const ScoredExtinction& b) { return a.error < b.error; }
+
+/// `soot` is the share of the mean that is distributed like soot.
+Extinction guess(PerMeter mean, double soot) {
+  return {Extinction::Model::field, (1 - soot) * mean, soot * mean};
 }
 
-/// Cold solves of one coarse problem, all by as many steps: candidates must differ in the extinction alone.
+/// Scores extinctions of one parameter, their mean: what distributes them follows from the light. A field
+/// that is free would also explain what the grid is too coarse to show.
 class Probe {
  public:
-  explicit Probe(const SolverSetup& setup)
-      : setup_(setup),
-        hull_(coarsen_to(setup.hull, kCoarse)),
-        level_(make_level(setup, hull_, stride_for_rays(setup, kRays), 4)) {}
+  explicit Probe(const SolverSetup& setup) : setup_(setup) {
+    const int stride = stride_for_rays(setup, kPixels);
+    levels_.push_back(make_level(setup, setup.hull, stride, 4));
+    const std::size_t views = setup.views.size();
+    const std::size_t folds = views > kFewestFitted ? std::min(kMostFolds, views) : 0;
+    for (std::size_t f = 0; f < folds; ++f)
+      levels_.push_back(make_level(setup, setup.hull, stride, 4, f * views / folds));
+  }
 
-  [[nodiscard]] Candidate solve(const Extinction& extinction) const {
-    ColdSolve solved = cold_solve(setup_, level_, extinction);
-    return {extinction, solved.error, std::move(solved.engine)};
+  /// The geometric mean of two RMS errors, grey levels: over the validation pixels of a fit of all views, and
+  /// over the views that are left out, one at a time. Both are mostly the coarse grid's own error, whose size
+  /// isn't known; independent normal errors of unknown size have this likelihood. Infinite where a solve
+  /// diverged.
+  [[nodiscard]] ScoredExtinction score(const Extinction& extinction) const {
+    std::vector<double> errors(levels_.size());
+    at_once(setup_.pool, static_cast<int>(levels_.size()), [&](int n) {
+      const auto at = static_cast<std::size_t>(n);
+      errors[at] = validation_error(levels_[at], extinction);
+    });
+    double squares = 0;
+    for (std::size_t f = 1; f < errors.size(); ++f) squares += errors[f] * errors[f];
+    if (errors.size() == 1) return {extinction, errors[0]};
+    const double of_views = std::sqrt(squares / static_cast<double>(errors.size() - 1));
+    return {extinction, std::sqrt(errors[0] * of_views)};
   }
 
   /// Mean length of a ray inside the hull.
   [[nodiscard]] Meters mean_chord() const {
-    const double rays = std::max(1.0, static_cast<double>(level_.problem.rays()));
-    return Meters(total_length(level_.problem.list, setup_.pool) / rays *
-                  static_cast<double>(hull_.grid.edge));
-  }
-
-  [[nodiscard]] FoundExtinction result(const Candidate& c) const {
-    Effects effects;
-    effects.extinction = c.extinction;
-    const std::vector<Rgba> x = c.engine ? c.engine->get() : std::vector<Rgba>(level_.problem.grid().size());
-    return {c.extinction, c.error, to_volume(x, level_.problem, hull_, effects), hull_};
+    const Problem& problem = levels_[0].problem;
+    const double rays = std::max(1.0, static_cast<double>(problem.rays()));
+    return Meters(total_length(problem.list, setup_.pool) / rays *
+                  static_cast<double>(setup_.hull.grid.edge));
   }
 
  private:
+  static constexpr std::size_t kPixels = 20000;
+  static constexpr std::size_t kMostFolds = 4;
+  static constexpr std::size_t kFewestFitted = 2;  // views
+  static constexpr int kSteps = 24;                // twice
+
+  /// Every candidate takes as many steps, whatever the level's subsets.
+  static void take_steps(Descent& descent, const Level& level, int steps) {
+    for (int taken = 0; taken < steps; taken += level.subsets) descent.pass();
+  }
+
+  [[nodiscard]] double validation_error(const Level& level, const Extinction& extinction) const try {
+    SolverSetup setup = setup_;
+    setup.smoothness = kLeastSmoothness;
+    Optics optics = setup.optics(level.problem.grid());
+    const bool absorbs = extinction.model != Extinction::Model::none;
+    optics.absorb = absorbs ? Absorb::field : Absorb::nothing;
+    const Extinction even = guess(extinction.value + extinction.soot, 0);
+    Descent first(level, optics, setup, {nullptr, absorbs ? &even : nullptr});
+    take_steps(first, level, kSteps);
+    Descent second(level, optics, setup, {&first.engine(), absorbs ? &extinction : nullptr});
+    take_steps(second, level, kSteps);
+    second.show_validation();
+    const double error = second.validation_error();
+    return std::isfinite(error) ? error : std::numeric_limits<double>::infinity();
+  } catch (const Diverged&) {
+    return std::numeric_limits<double>::infinity();
+  }
+
   const SolverSetup& setup_;
-  Hull hull_;
-  Level level_;
+  std::vector<Level> levels_;  // all views, then without one each
 };
 
 /// The lowest of the parabola through three points (place, squared error), kept inside their range.
@@ -69,59 +111,113 @@ double vertex(const std::array<double, 3>& x, const std::array<double, 3>& error
   return std::clamp(0.5 * (x[0] + x[1]) - 0.5 * ab / curvature, x[0], x[2]);
 }
 
-/// Tries places along a line, then the vertex of the parabola around the best.
-template <class Try, class Late>
-Candidate search_line(const Pool& pool, const std::vector<double>& places, const Try& attempt,
-                      const Late& late) {
-  std::vector<std::optional<Candidate>> attempts(places.size());
-  std::mutex asking;
-  at_once(pool, static_cast<int>(places.size()), [&](int n) {
-    const auto at = static_cast<std::size_t>(n);
-    const auto too_late = [&] {
-      const std::lock_guard lock(asking);  // the caller's clock need not be for several threads
-      return late();
-    };
-    if (at == 0 || !too_late()) attempts[at] = attempt(places[at]);
-  });
-  std::vector<Candidate> tried;  // up to the first that came too late
-  for (std::size_t n = 0; n < attempts.size() && attempts[n]; ++n) tried.push_back(*std::move(attempts[n]));
-  const auto better = [](const Candidate& a, const Candidate& b) { return a.error < b.error; };
-  const auto best = std::min_element(tried.begin(), tried.end(), better);
+/// Doubles the depth until the error has clearly risen, then tries the vertex of the parabola around the
+/// best.
+template <class Late>
+std::vector<ScoredExtinction> search_depth(const Probe& probe, double soot, const Late& late) {
+  constexpr double kClearly = 1.1;  // of nearly equal depths errors don't rise and fall smoothly
+  const double chord = probe.mean_chord().value();
+  const auto attempt = [&](double depth) { return probe.score(guess(PerMeter(depth / chord), soot)); };
+  std::vector<ScoredExtinction> tried;
+  double least = std::numeric_limits<double>::infinity();
+  for (double depth = kThinnest; depth <= kThickest && !late(); depth *= 2) {
+    tried.push_back(attempt(depth));
+    least = std::min(least, tried.back().error);
+    if (tried.back().error > kClearly * least) break;
+  }
+  const auto best = std::min_element(tried.begin(), tried.end(), scores_better);
   const auto at = static_cast<std::size_t>(best - tried.begin());
-  if (at == 0 || at + 1 == tried.size() || late()) return *best;
-  const double next = vertex({places[at - 1], places[at], places[at + 1]},
-                             {tried[at - 1].error, tried[at].error, tried[at + 1].error});
-  if (std::abs(next - places[at]) <= 0.05 * (places[at + 1] - places[at - 1])) return *best;
-  Candidate refined = attempt(next);
-  return better(refined, *best) ? refined : *best;
+  if (at == 0 || at + 1 >= tried.size() || late()) return tried;
+  const double octave = vertex({-1.0, 0.0, 1.0}, {tried[at - 1].error, tried[at].error, tried[at + 1].error});
+  tried.push_back(attempt(kThinnest * std::exp2(static_cast<double>(at) + octave)));
+  return tried;
+}
+
+double mean_extinction(const Extinction& e) { return e.value.value() + e.soot.value(); }
+
+/// The best candidate, with the extremes of those that are nearly as good.
+EstimatedExtinction best_of(std::vector<ScoredExtinction> candidates) {
+  constexpr double kHardlyWorse = 1.05;
+  const ScoredExtinction best = *std::min_element(candidates.begin(), candidates.end(), scores_better);
+  EstimatedExtinction estimate{best.extinction, best.error};
+  std::erase_if(candidates,
+                [&](const ScoredExtinction& c) { return !(c.error <= kHardlyWorse * best.error); });
+  const auto [thinnest, thickest] = std::minmax_element(
+      candidates.begin(), candidates.end(), [](const ScoredExtinction& a, const ScoredExtinction& b) {
+        return mean_extinction(a.extinction) < mean_extinction(b.extinction);
+      });
+  for (const auto& extreme : {thinnest, thickest})
+    if (mean_extinction(extreme->extinction) != mean_extinction(best.extinction))
+      estimate.alternatives.push_back(extreme->extinction);
+  return estimate;
+}
+
+Box box_around(const Grid& g) {
+  const Eigen::Vector3d size = static_cast<double>(g.edge) * Eigen::Vector3d(g.nx - 1, g.ny - 1, g.nz - 1);
+  return {Eigen::Vector3f(g.origin[0], g.origin[1], g.origin[2]).cast<double>() + size / 2, size};
 }
 
 }  // namespace
 
-FoundExtinction find_extinction(const SolverSetup& setup, const Elapsed& elapsed) {
-  const auto late = [&] { return is_spent(1.0 / 3, setup.options, elapsed); };
-  const Probe probe(setup);
-  const double chord = probe.mean_chord().value();
-  const Candidate even = search_line(
-      setup.pool, {0.0, 0.3, 0.7, 1.2, 3.0},
-      [&](double depth) { return probe.solve(guess(PerMeter(depth / chord), PerMeter(0))); }, late);
-  const double total = even.extinction.value.value();
-  if (total <= 0 || late()) return probe.result(even);
-  // The same mean, from all even to all like soot.
-  const Candidate mixed = search_line(
-      setup.pool, {0.0, 0.5, 1.0},
-      [&](double share) {
-        return share == 0 ? even : probe.solve(guess(PerMeter((1 - share) * total), PerMeter(share * total)));
-      },
-      late);
-  return probe.result(mixed);
+Result<Hull> carve_probe(const SolverSetup& setup, const Scene& linear, const std::vector<FlameMask>& masks) {
+  constexpr int kFirst = 32;
+  constexpr double kProbeVoxels = 4000;
+  constexpr int kRounds = 2;             // the first coarse hull is larger than the medium
+  constexpr double kPixelsPerVoxel = 2;  // fewer leave voxels that hang on hardly any ray
+  const ComputeOptions& compute = setup.options.compute;
+  EMBERLOCK_ASSIGN_OR_RETURN(Hull hull, carve(linear, masks, grid_over(linear.box, kFirst), compute));
+  for (int round = 0; round < kRounds; ++round) {
+    const Grid cropped = crop_to_medium(hull).hull.grid;
+    const Box box = box_around(cropped);
+    const auto edge = static_cast<double>(cropped.edge);
+    const double smallest = edge * std::max(std::cbrt(static_cast<double>(hull.count) / kProbeVoxels),
+                                            kPixelsPerVoxel / pixels_per_voxel(setup, cropped));
+    const double voxels = std::clamp(box.size.maxCoeff() / smallest, 8.0, 128.0);
+    auto finer = carve(linear, masks, grid_over(box, static_cast<int>(std::lround(voxels))), compute);
+    if (!finer.ok()) break;
+    hull = *std::move(finer);
+  }
+  return hull;
 }
 
-FoundExtinction try_extinction(const SolverSetup& setup, const Extinction& extinction) {
-  const Probe probe(setup);
+EstimatedExtinction find_extinction(const SolverSetup& probing, bool forced, const Elapsed& elapsed) {
+  std::mutex asking;
+  const auto late = [&] {
+    const std::lock_guard lock(asking);  // the caller's clock need not be for several threads
+    return is_spent(1.0 / 3, probing.options, elapsed);
+  };
+  const Probe probe(probing);
+  // Where no time is left to search, a field that is asked for starts from half of what would be opaque.
+  const PerMeter blind(1 / (2 * probe.mean_chord().value()));
+  if (late()) return {forced ? guess(blind, 0.5) : Extinction{}};
+  std::vector<ScoredExtinction> candidates;
+  const ScoredExtinction none = probe.score({});
+  if (!forced) candidates.push_back(none);  // stays the best among equals
+  constexpr std::array<double, 3> kSoot = {0, 0.5, 1};
+  std::array<std::vector<ScoredExtinction>, kSoot.size()> tried;
+  at_once(probing.pool, static_cast<int>(kSoot.size()), [&](int n) {
+    const auto at = static_cast<std::size_t>(n);
+    tried[at] = search_depth(probe, kSoot[at], late);
+  });
+  for (const auto& of_one : tried) candidates.insert(candidates.end(), of_one.begin(), of_one.end());
+  std::erase_if(candidates, [](const ScoredExtinction& c) { return !std::isfinite(c.error); });
+  if (candidates.empty()) return {forced ? guess(blind, 0.5) : Extinction{}};
+  EstimatedExtinction estimate = best_of(std::move(candidates));
+  estimate.error_of_none = none.error;
+  return estimate;
+}
+
+CoarseSolution try_extinction(const SolverSetup& setup, const Extinction& extinction) {
+  const Hull hull = coarsen_to(setup.hull, kCoarse);
+  const Level level = make_level(setup, hull, stride_for_rays(setup, kRays), 4);
   Extinction field = extinction;
   if (field.model == Extinction::Model::constant) field.model = Extinction::Model::field;
-  return probe.result(probe.solve(field));
+  const ColdSolve solved = cold_solve(setup, level, field);
+  Effects effects;
+  effects.extinction = field;
+  const std::vector<Rgba> x =
+      solved.engine ? solved.engine->get() : std::vector<Rgba>(level.problem.grid().size());
+  return {to_volume(x, level.problem, hull, effects), hull};
 }
 
 }  // namespace emberlock::recon

@@ -1,27 +1,43 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include "base/result.h"
 #include "recon/adjust/tracker.h"
+#include "recon/views/flame_mask.h"
 
 namespace emberlock::recon {
 
-/// The extinction found from the pictures on a coarse grid.
-struct FoundExtinction {
+/// A hull of about 4000 voxels over the medium's own bounds, whatever grid a run asks for, so that a choice
+/// made on it doesn't depend on that grid. It is coarser where the pictures of `setup.views` don't resolve
+/// that many. Errors: those of carve().
+Result<Hull> carve_probe(const SolverSetup& setup, const Scene& linear, const std::vector<FlameMask>& masks);
+
+/// The extinction estimated from the pictures.
+struct EstimatedExtinction {
   Extinction extinction;  ///< initial value of a field, or none
-  double error = 0;       ///< RMS over held-out pixels, grey levels
-  Volume volume;          ///< the coarse solution: emission, and extinction if there is any
-  Hull hull;              ///< its medium
+  /// Validation errors with it and with none, grey levels; 0 where there was no time.
+  double error = 0;
+  double error_of_none = 0;
+  /// The thinnest and the thickest candidate that validation hardly tells from it (by less than a twentieth
+  /// of its error), if they are others.
+  std::vector<Extinction> alternatives = {};
 };
 
-/// Finds how much light the medium absorbs, and whether uniformly or like soot. Descent from a wrong scale
-/// doesn't recover, so this is a global search: cold solves for emission and extinction together, with a
-/// fraction of the pixels, each with another expected extinction, compared on held-out pixels of the input
-/// views. `setup.hull` is the hull of the fine grid.
+/// Estimates how much light the medium absorbs, and whether uniformly, like soot, or half of each. Descent
+/// from a wrong scale doesn't recover, so this is a global search by cross-validation (Stone 1974): solves on
+/// the hull of `probing` (of carve_probe()), each by as many steps from zero, judged on pixels and on views
+/// that are left out of the fit. The candidates are no extinction, unless `forced`, and for each distribution
+/// optical depths that double along the mean ray.
 ///
 /// With a budget, the search ends when it has used a third of it.
-FoundExtinction find_extinction(const SolverSetup& setup, const Elapsed& elapsed = {});
+EstimatedExtinction find_extinction(const SolverSetup& probing, bool forced, const Elapsed& elapsed = {});
 
-/// The same solve for a given extinction.
-FoundExtinction try_extinction(const SolverSetup& setup, const Extinction& extinction);
+/// A rough solution with a given extinction.
+struct CoarseSolution {
+  Volume volume;  ///< emission, and extinction if there is any
+  Hull hull;      ///< its medium
+};
+/// A cold solve on the hull of `setup`, coarsened to at most 64 voxels along its longest side.
+CoarseSolution try_extinction(const SolverSetup& setup, const Extinction& extinction);
 
 }  // namespace emberlock::recon

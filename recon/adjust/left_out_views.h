@@ -15,24 +15,15 @@ namespace emberlock::recon {
 /// one at a time, and compared with the result.
 class LeftOutViews {
  public:
-  /// How coarse it looks, by voxels along the longest side and pixels of the flames' boxes, at most.
-  struct Size {
-    int voxels = 64;
-    std::size_t pixels = 30000;
-  };
-  /// Twice as fine.
-  static constexpr Size kCloser{128, 120000};
-
-  /// Leaves out at most four of the input views, spread over them. The setup must outlive it.
-  LeftOutViews(const SolverSetup& setup, const Hull& fine, const Size& most);
-  LeftOutViews(const SolverSetup& setup, const Hull& fine) : LeftOutViews(setup, fine, Size{}) {}
+  /// Leaves out at most four of the input views, spread over them, on a hull of at most 64 voxels along its
+  /// longest side. The setup must outlive it.
+  LeftOutViews(const SolverSetup& setup, const Hull& fine);
 
   /// Whether there are enough views: two must remain.
   [[nodiscard]] bool any() const { return !levels_.empty(); }
   /// RMS over the left-out views' pixels that see the hull, grey levels; infinite if a solve diverged.
   /// `extinction`: as in cold_solve().
   [[nodiscard]] double error(const Extinction& extinction, double smoothness) const;
-  [[nodiscard]] const Grid& grid() const { return hull_.grid; }
 
  private:
   const SolverSetup& setup_;

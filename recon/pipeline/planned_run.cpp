@@ -21,8 +21,16 @@ constexpr int kMostAttempts = 3;
 constexpr double kWorthTrying = 0.97;  // of the error reached: a smaller gain is not worth another attempt
 constexpr double kLargestCorrection = 4;
 
+constexpr double kShareOfPlain = 0.25;  // of the seconds left, for a run without effects before one with them
+
 double heldout_error(const Outcome& outcome) {
   return all_channels(outcome.report.trace.back().heldout_rmse);
+}
+
+/// The error that runs are compared by: of the held-out views, or of the input views where none is held out.
+double validation_error(const Outcome& outcome) {
+  return outcome.report.heldout_rmse ? all_channels(*outcome.report.heldout_rmse)
+                                     : all_channels(outcome.report.input_rmse);
 }
 
 /// The front for the scene at hand, and what the user left open of it.
@@ -44,14 +52,15 @@ class Choices {
 
   [[nodiscard]] const WorkPoint* next(const Goal& goal) const { return choose(open_, goal); }
 
-  /// Up to the front's lowest error with these settings; more iterations may raise it.
-  [[nodiscard]] int iterations(const Settings& settings) const {
+  /// The best run without effects within so many seconds, or on this grid; nullptr where there is none.
+  [[nodiscard]] const WorkPoint* plain_within(double seconds, std::optional<int> voxels = {}) const {
     const WorkPoint* best = nullptr;
     for (const WorkPoint& p : open_) {
-      if (p.settings.voxels != settings.voxels || p.settings.effects != settings.effects) continue;
+      if (p.settings.effects != "none" || p.seconds > seconds) continue;
+      if (voxels && p.settings.voxels != *voxels) continue;
       if (best == nullptr || p.error < best->error) best = &p;
     }
-    return best == nullptr ? settings.iterations : best->settings.iterations;
+    return best;
   }
 
   /// Makes the front agree with a run of these settings.
@@ -133,6 +142,7 @@ class PlannedRun {
     Choices choices(task_.scene(), asked_, reference_);
     const WorkPoint* point = choices.next(goal());
     if (point == nullptr) return run_once(task_, asked_, progress_);
+    if (compares(*point)) return run_with_and_without(choices, *point);
     std::optional<Outcome> best;
     bool cut_short = false;
     if (!fits(*point) || stopped()) best = from_reference();
@@ -178,6 +188,47 @@ class PlannedRun {
                        [](const View& v) { return v.role == ViewRole::held_out; });
   }
 
+  /// Whether a run with effects is to be compared with one without.
+  [[nodiscard]] bool compares(const WorkPoint& point) const {
+    return !asked_.effects && asked_.solve.budget && !asked_.solve.target_rmse &&
+           point.settings.effects == "auto" && fits(point) && !stopped();
+  }
+
+  /// A search for effects may err and takes time, so a run without them comes first: whatever follows
+  /// replaces it only with a lower validation error. Seconds that are left then go to the same grid without
+  /// effects.
+  Result<Outcome> run_with_and_without(const Choices& choices, const WorkPoint& point) {
+    std::optional<Outcome> best;
+    PlanReport plan_of_best;
+    bool cut_short = false;
+    const auto take = [&](const WorkPoint& next, double most_seconds) -> Status {
+      EMBERLOCK_ASSIGN_OR_RETURN(Outcome outcome, attempt(next, choices, most_seconds));
+      cut_short = cut_short || outcome.report.stopped;
+      if (best && !(validation_error(outcome) < validation_error(*best))) return {};
+      best = std::move(outcome);
+      plan_of_best = plan_;
+      return {};
+    };
+    if (const WorkPoint* plain = choices.plain_within(kShareOfPlain * seconds_left()))
+      EMBERLOCK_RETURN_IF_ERROR(take(*plain, 2 * kShareOfPlain * seconds_left()));
+    if (!best || (point.seconds <= seconds_left() && !stopped()))
+      EMBERLOCK_RETURN_IF_ERROR(take(point, INFINITY));
+    const WorkPoint* same_grid = choices.plain_within(kShareOfBudget * seconds_left(), point.settings.voxels);
+    if (same_grid != nullptr && !stopped()) EMBERLOCK_RETURN_IF_ERROR(take(*same_grid, INFINITY));
+    if (plan_.attempts > 1) {
+      plan_of_best.words = plan_.words;
+      plan_of_best.words.push_back(fmt::format(
+          "of {} runs the one with {} voxels and effects {} has the lowest {} error, {:.3g} grey levels",
+          plan_.attempts, plan_of_best.voxels, plan_of_best.effects_searched ? "searched for" : "left out",
+          best->report.heldout_rmse ? "held-out" : "input", validation_error(*best)));
+      plan_of_best.attempts = plan_.attempts;
+    }
+    plan_ = std::move(plan_of_best);
+    best->report.stopped = best->report.stopped || cut_short;
+    conclude(*best, choices);
+    return std::move(*best);
+  }
+
   [[nodiscard]] double seconds_left() const {
     return asked_.solve.budget ? (*asked_.solve.budget - task_.elapsed()).value() : INFINITY;
   }
@@ -212,16 +263,16 @@ class PlannedRun {
     return outcome;
   }
 
-  Result<Outcome> attempt(const WorkPoint& point, const Choices& choices) {
+  /// `most_seconds` end it before the budget does.
+  Result<Outcome> attempt(const WorkPoint& point, const Choices& choices, double most_seconds = INFINITY) {
     ReconstructOptions options = asked_;
     options.voxels = point.settings.voxels;
     const bool searchable = point.settings.effects == "auto" && point.seconds <= seconds_left();
     if (!asked_.effects && !searchable) options.effects = EffectRequest{Effects{}};
-    // On the way to a target the solver's own rule says when there is no more to gain.
-    if (options.solve.iterations == 0 && !asked_.solve.target_rmse)
-      options.solve.iterations = choices.iterations(point.settings);
-    if (asked_.solve.budget)
-      options.solve.budget = Seconds(std::max(1e-6, asked_.solve.budget->value() - rendering(point)));
+    if (asked_.solve.budget) {
+      const double end = std::min(asked_.solve.budget->value(), task_.elapsed().value() + most_seconds);
+      options.solve.budget = Seconds(std::max(1e-6, end - rendering(point)));
+    }
     describe(point, options, choices);
     const double from = progress_from(plan_.attempts++);
     const double to = progress_from(plan_.attempts);
@@ -238,11 +289,8 @@ class PlannedRun {
            static_cast<double>(task_.scene().views.size());
   }
 
-  /// Later attempts may follow only where there is a target; each gets half of what is left of the bar.
-  [[nodiscard]] double progress_from(int attempts) const {
-    if (attempts == 0) return 0.05;
-    return asked_.solve.target_rmse ? 1 - 0.95 * std::pow(0.5, attempts) : 1;
-  }
+  /// Each attempt gets half of what is left of the bar: another may follow.
+  static double progress_from(int attempts) { return 1 - 0.95 * std::pow(0.5, attempts); }
 
   void describe(const WorkPoint& point, const ReconstructOptions& options, const Choices& choices) {
     plan_.voxels = point.settings.voxels;

@@ -12,9 +12,12 @@ bool has_goal(const ReconstructOptions& options);
 /// - a reference run (reference_run.h) scales the reference front to this machine and scene;
 /// - choose() takes a point that fits into nine tenths of what is left of the budget; effects are searched
 /// for
-///   only if that fits too; iterations go on to the front's lowest error for these voxels (on the way to a
-///   target by the solver's rule), and the solver stops when the budget, less the predicted rendering, is
-///   spent. So the end comes at most one iteration and the error of that prediction after the budget;
+///   only if that fits too; iterations end by the solver's rule or when the budget, less the predicted
+///   rendering, is spent. So the end comes at most one iteration and the error of that prediction after the
+///   budget;
+/// - before a run that searches for effects comes a quick one without, and where time is left after it one on
+/// the
+///   same grid without: the result has the lowest validation error of them;
 /// - where not even the quickest point fits, the reference run itself is the result;
 /// - a target that was missed is tried again, at most twice, with more voxels, by the front as rescaled by
 /// what

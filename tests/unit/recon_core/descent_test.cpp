@@ -124,7 +124,7 @@ TEST_P(DescentOn, ColdSolvesTakeAConstantExtinctionForWhatItIs) {
   effects.extinction = constant_extinction(PerMeter(20));
   const Posed posed(device_here(), ball_of(64), 12, 4, effects);
   Descent descent(posed.level, posed.setup.optics(posed.hull.grid), posed.setup);
-  after_passes(descent, 6);
+  after_passes(descent, 24 / posed.level.subsets);
   const ColdSolve cold = cold_solve(posed.setup, posed.level, effects.extinction);
   descent.show_validation();
   EXPECT_EQ(cold.error, descent.validation_error());

@@ -9,8 +9,8 @@
 namespace emberlock::recon {
 namespace {
 
-constexpr int kVoxels = 64;             // along the longest side, at most
-constexpr std::size_t kPixels = 30000;  // of the flames' boxes
+constexpr int kFoldVoxels = 64;             // along the longest side, at most
+constexpr std::size_t kFoldPixels = 30000;  // of the flames' boxes
 constexpr std::size_t kMostFolds = 4;
 constexpr std::size_t kFewestFitted = 2;        // views
 constexpr double kLeastGainOfSmoothing = 0.01;  // a smoother volume must lower the error by this share
@@ -18,11 +18,11 @@ constexpr double kLeastGainOfSmoothing = 0.01;  // a smoother volume must lower 
 }  // namespace
 
 LeftOutViews::LeftOutViews(const SolverSetup& setup, const Hull& fine)
-    : setup_(setup), hull_(coarsen_to(fine, kVoxels)) {
+    : setup_(setup), hull_(coarsen_to(fine, kFoldVoxels)) {
   const std::size_t views = setup.views.size();
   if (views < kFewestFitted + 1) return;
   const std::size_t folds = std::min(kMostFolds, views);
-  const int stride = std::max(stride_for(setup, hull_.grid), stride_for_rays(setup, kPixels));
+  const int stride = std::max(stride_for(setup, hull_.grid), stride_for_rays(setup, kFoldPixels));
   for (std::size_t f = 0; f < folds; ++f)
     levels_.push_back(make_level(setup, hull_, stride, 4, f * views / folds));
 }

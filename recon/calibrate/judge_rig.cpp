@@ -129,8 +129,8 @@ std::string fault_of(const RigCalibration& result, const std::vector<PlacedSight
                     [&](const BundleView& view) { return view.camera == at && view.used() > 0; });
   if (static_cast<double>(used) < kFewestUsed * static_cast<double>(views))
     return fmt::format("only {} of its {} views fit the other cameras'", used, views);
-  const Eigen::VectorXd sigma = result.covariance.diagonal().segment<kCameraUnknowns>(
-      static_cast<Eigen::Index>(at) * kCameraUnknowns);
+  const Eigen::VectorXd sigma =
+      result.covariance.diagonal().segment<kCameraUnknowns>(static_cast<Eigen::Index>(at) * kCameraUnknowns);
   return lens_misfit(result.bundle.cameras[at], sigma.cwiseSqrt());
 }
 
@@ -143,14 +143,16 @@ Misfit misfit_of(const BoardSightings& sightings, const std::vector<SeenBoards>&
     const auto miss = disagreement(sightings.board, seen[other], seen[at]);
     const auto flipped = disagreement(sightings.board, seen[other], mirrored);
     if (!miss || !flipped || *flipped >= kAgreement * half_diagonal(mirrored.lens)) continue;
-    return {camera, true,
-            fmt::format("its pictures are mirror images: flipped they fit those of {} to {:.1f} pixels, as they "
-                        "are to {:.0f}. {}",
-                        sightings.cameras[group[other]].id, *flipped, *miss, kSwitchMirroringOff)};
+    return {
+        camera, true,
+        fmt::format("its pictures are mirror images: flipped they fit those of {} to {:.1f} pixels, as they "
+                    "are to {:.0f}. {}",
+                    sightings.cameras[group[other]].id, *flipped, *miss, kSwitchMirroringOff)};
   }
-  return {camera, false,
-          (fault.empty() ? "its views disagree with the other cameras'" : fault) +
-              ". Check that pictures of one name or number were taken at one instant, with one focus and zoom"};
+  return {
+      camera, false,
+      (fault.empty() ? "its views disagree with the other cameras'" : fault) +
+          ". Check that pictures of one name or number were taken at one instant, with one focus and zoom"};
 }
 
 }  // namespace

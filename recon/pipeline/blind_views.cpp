@@ -14,7 +14,7 @@
 namespace emberlock::recon {
 namespace {
 
-constexpr double kWhite = 255;
+constexpr double kSaturated = 255;
 
 std::array<float, 3> median_of(const RadianceImage& image) {
   std::array<float, 3> medians = {};
@@ -77,7 +77,7 @@ std::optional<std::string> blindness(const View& view, const FlameMask& mask, co
   const std::array<float, 3> medians = median_of(*view.image);
   if (view.background || stands_out(*view.image, medians)) return std::nullopt;
   const double level = *std::max_element(medians.begin(), medians.end());
-  const char* kind = level < 1 ? "black" : level >= kWhite - 1 ? "white (saturated)" : "of one grey";
+  const char* kind = level < 1 ? "black" : level >= kSaturated - 1 ? "white (saturated)" : "of one grey";
   return fmt::format("shows no flame: its picture is {}, {:.3g} of 255 grey levels", kind, level);
 }
 

@@ -67,8 +67,14 @@ Beginning begin_coarse_to_fine(const SolverSetup& setup, Tracker& tracker) {
     auto finer = std::make_unique<const Level>(make_level(setup, hulls[l], stride_for(setup, hulls[l].grid)));
     if (begun.descent) begun.descent->settle();  // nobody has judged the last pass yet
     if (begun.descent) begun.halvings += begun.descent->halvings();
-    begun.descent = begin(*finer, setup, begun.descent ? &begun.descent->engine() : nullptr);
+    const bool is_dark = !begun.descent;
+    begun.descent = begin(*finer, setup, is_dark ? nullptr : &begun.descent->engine());
     begun.level = std::move(finer);
+    if (is_dark && setup.effects.extinction.soot.value() > 0) {  // light distributes it, and there was none
+      for (int s = 0; s < kCoarseSteps && !tracker.out_of_time(); s += begun.level->subsets)
+        begun.descent->pass();
+      begun.descent = begin(*begun.level, setup, &begun.descent->engine());
+    }
     for (int s = 0; l > 0 && s < kCoarseSteps && !tracker.out_of_time(); s += begun.level->subsets)
       begun.descent->pass();
   }

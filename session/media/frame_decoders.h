@@ -8,14 +8,18 @@
 
 #include "base/result.h"
 #include "session/media/frame_file.h"
+#include "session/media/still_contents.h"
 
 // The decoders from which FrameFile chooses by the first bytes of a file.
 namespace emberlock::session {
 
 /// PNM, PNG, JPEG or TIFF, by their magic numbers.
 bool is_still_image(std::string_view head);
-/// `content` is the whole file; `where` names it in errors.
+/// The first picture. `content` is the whole file; `where` names it in errors.
 Result<Image> decode_still_image(std::string_view content, const std::string& where);
+/// One of the pictures that examine_still() found in `file`; of a TIFF, the file's header is changed.
+Result<Image> decode_picture(std::string& file, const StillContents::Picture& picture,
+                             const std::string& where);
 
 /// Of a whole PNG or JPEG, without decoding it. Errors: it is neither, or truncated.
 Result<ImageSize> picture_size(std::string_view content, const std::string& where);
@@ -27,8 +31,11 @@ bool is_fits(std::string_view head);
 /// upwards.
 Result<Image> decode_fits(std::string_view content, const std::string& where);
 
+/// Time stamps of a video's frames: with those that libavformat infers, or only those that the file holds.
+enum class Stamps { inferred, stored };
 /// Any file that libavformat recognises.
-Result<std::unique_ptr<FrameFile>> open_video(const std::filesystem::path& path, Colours colours);
+Result<std::unique_ptr<FrameFile>> open_video(const std::filesystem::path& path, Colours colours,
+                                              Stamps stamps = Stamps::inferred);
 
 /// Whether an image of this size may be decoded: both sides within 1..kMaxImageSide.
 Status check_image_size(std::int64_t width, std::int64_t height, const std::string& where);

@@ -5,6 +5,7 @@
 #include <cerrno>
 #include <cstdarg>
 #include <cstdio>
+#include <cstring>
 #include <mutex>
 #include <system_error>
 #include <utility>
@@ -49,6 +50,7 @@ Result<AvInput> open_file(const std::filesystem::path& path, Checking checking) 
   format->io_open = deny_open;
   format->flags |= AVFMT_FLAG_CUSTOM_IO;
   if (checking == Checking::strict) format->error_recognition |= AV_EF_CRCCHECK;
+  if (checking == Checking::unfilled) format->flags |= AVFMT_FLAG_NOFILLIN;
   // On failure avformat_open_input frees the context itself.
   int code = avformat_open_input(&format, "", nullptr, nullptr);
   if (code < 0) return not_a_video(path, av_message(code));
@@ -146,6 +148,26 @@ Result<AvInput> open_av_input(const std::filesystem::path& path, Checking checki
   const int code = open_decoder(input, codec, checking);
   if (code < 0) return not_a_video(path, av_message(code));
   return input;
+}
+
+VideoDisplay display_of(const AVStream& stream) {
+  constexpr std::array<std::int32_t, 9> kAsStored{1 << 16, 0, 0, 0, 1 << 16, 0, 0, 0, 1 << 30};
+  VideoDisplay display;
+  std::size_t size = 0;
+  const std::uint8_t* const data = av_stream_get_side_data(&stream, AV_PKT_DATA_DISPLAYMATRIX, &size);
+  std::array<std::int32_t, 9> matrix{};
+  if (data != nullptr && size >= sizeof matrix) {
+    std::memcpy(matrix.data(), data, sizeof matrix);
+    matrix[6] = matrix[7] = 0;  // offsets only move the picture within a player's window
+    if (matrix != kAsStored) display.matrix = matrix;
+  }
+  const AVRational container = stream.sample_aspect_ratio;
+  const AVRational pixel = container.num > 0 ? container : stream.codecpar->sample_aspect_ratio;
+  if (pixel.num > 0 && pixel.den > 0) {
+    display.pixel_width = pixel.num;
+    display.pixel_height = pixel.den;
+  }
+  return display;
 }
 
 Result<AvSound> open_av_sound(const std::filesystem::path& path) {

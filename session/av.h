@@ -15,6 +15,7 @@ extern "C" {
 #include "base/quantity.h"
 #include "base/result.h"
 #include "base/unique_fd.h"
+#include "session/video_display.h"
 
 // RAII owners of libav's objects. Files are passed to libav as descriptors, so protocols and special file
 // names have no effect.
@@ -76,12 +77,15 @@ struct AvInput {
 };
 
 enum class Checking {
-  lenient,  ///< errors are concealed as far as the decoder can
-  strict,   ///< checksums are verified; damage is an error
+  lenient,   ///< errors are concealed as far as the decoder can
+  strict,    ///< checksums are verified; damage is an error
+  unfilled,  ///< as lenient, but packets have only those time stamps that the file holds
 };
 
 /// Opens the first video stream of `path`. No other file is read, even if the file refers to one.
 Result<AvInput> open_av_input(const std::filesystem::path& path, Checking checking);
+
+VideoDisplay display_of(const AVStream& stream);
 
 /// The sound track of a local video file opened for reading.
 struct AvSound {

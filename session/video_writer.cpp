@@ -88,6 +88,7 @@ struct VideoWriter::Libav {
             "Check the disk's space and health"};
   }
   Coding coding = Coding::for_players;
+  VideoDisplay display;
   int open(const ImageLayout& layout, Hertz frame_rate, int key_interval);
   int open_encoder(const ImageLayout& layout, Hertz frame_rate, int key_interval);
 };
@@ -109,6 +110,7 @@ int VideoWriter::Libav::open_encoder(const ImageLayout& layout, Hertz frame_rate
     c.colorspace = AVCOL_SPC_SMPTE170M;
     c.color_range = AVCOL_RANGE_MPEG;
   }
+  if (!display.square()) c.sample_aspect_ratio = {display.pixel_width, display.pixel_height};
   c.framerate = av_d2q(frame_rate.value(), kLargestRateTerm);
   c.time_base = av_inv_q(c.framerate);
   c.flags |= AV_CODEC_FLAG_GLOBAL_HEADER;
@@ -153,6 +155,13 @@ int VideoWriter::Libav::open(const ImageLayout& layout, Hertz frame_rate, int ke
   stream->time_base = c.time_base;
   stream->avg_frame_rate = c.framerate;
   avcodec_parameters_from_context(stream->codecpar, &c);
+  stream->sample_aspect_ratio = c.sample_aspect_ratio;
+  if (display.matrix && holds_matrix(coding)) {
+    std::uint8_t* const data =
+        av_stream_new_side_data(stream, AV_PKT_DATA_DISPLAYMATRIX, sizeof *display.matrix);
+    if (data == nullptr) return AVERROR(ENOMEM);
+    std::memcpy(data, display.matrix->data(), sizeof *display.matrix);
+  }
   return avformat_write_header(output, nullptr);
 }
 
@@ -162,10 +171,12 @@ VideoWriter::~VideoWriter() = default;
 
 Result<std::unique_ptr<VideoWriter>> VideoWriter::create(const std::filesystem::path& path,
                                                          const ImageLayout& layout, Hertz frame_rate,
-                                                         int key_interval, Coding coding) {
+                                                         int key_interval, Coding coding,
+                                                         const VideoDisplay& display) {
   quiet_libav();
   auto av = std::make_unique<Libav>();
   av->coding = coding;
+  av->display = display;
   EMBERLOCK_ASSIGN_OR_RETURN(av->file, AvFile::open(path, AvFile::Mode::create));
   if (const int code = av->open(layout, frame_rate, key_interval); code < 0)
     return av->failure(code, "cannot write a video");

@@ -9,6 +9,7 @@
 #include "base/image.h"
 #include "base/quantity.h"
 #include "base/result.h"
+#include "session/video_display.h"
 
 namespace emberlock::session {
 
@@ -24,7 +25,10 @@ class VideoWriter {
   static Result<std::unique_ptr<VideoWriter>> create(const std::filesystem::path& path,
                                                      const ImageLayout& layout, Hertz frame_rate,
                                                      int key_interval = 0,
-                                                     Coding coding = Coding::for_players);
+                                                     Coding coding = Coding::for_players,
+                                                     const VideoDisplay& display = {});
+  /// Whether videos of this coding hold a display matrix.
+  [[nodiscard]] static bool holds_matrix(Coding coding) { return coding == Coding::for_players; }
   VideoWriter(const VideoWriter&) = delete;
   VideoWriter& operator=(const VideoWriter&) = delete;
   ~VideoWriter();

@@ -3,6 +3,8 @@
 
 #include <utility>
 
+#include <fmt/format.h>
+
 namespace emberlock::session {
 
 ClipReader::ClipReader(std::vector<ClipPart> parts, Colours colours)
@@ -17,14 +19,38 @@ std::size_t ClipReader::part_of(std::int64_t place) const {
 }
 
 Status ClipReader::seek(std::int64_t place) {
+  const std::int64_t from = place_;
   place_ = place;
-  file_.reset();
-  if (place >= frames()) return {};
-  open_ = part_of(place);
-  const ClipPart& part = parts_[open_];
+  if (place >= frames()) {
+    file_.reset();
+    return {};
+  }
+  const std::size_t index = part_of(place);
+  const ClipPart& part = parts_[index];
+  std::int64_t ahead = place - from;
+  const bool reads_on = file_ && index == open_ && part.scan.counted && from >= part.first && ahead >= 0;
+  if (!reads_on) {
+    EMBERLOCK_RETURN_IF_ERROR(open(index));
+    ahead = place - part.first;
+  }
+  const Status moved = part.scan.counted || ahead == 0
+                           ? file_->skip(ahead)
+                           : file_->seek(part.scan.ticks[static_cast<std::size_t>(ahead)]);
+  if (!moved.ok()) file_.reset();  // it isn't at `place_`
+  return moved;
+}
+
+Status ClipReader::open(std::size_t index) {
+  const ClipPart& part = parts_[index];
+  open_ = index;
   EMBERLOCK_ASSIGN_OR_RETURN(file_, FrameFile::open(part.path, colours_));
-  const auto within = static_cast<std::size_t>(place - part.first);
-  return within == 0 ? Status{} : file_->seek(part.scan.ticks[within]);
+  if (file_->pictures() > part.scan.frames()) {
+    return Error{ErrorKind::bad_input,
+                 fmt::format("holds {} pictures, where {} are expected as in the camera's first file",
+                             file_->pictures(), part.scan.frames()),
+                 part.path.string(), "Split it into one file for each picture"};
+  }
+  return {};
 }
 
 Result<Image> ClipReader::next() {
@@ -40,11 +66,12 @@ Result<Image> ClipReader::next() {
   };
   Result<Image> image = file_->next();
   if (!image) {
+    file_.reset();  // it is no longer at `place_`
     if (image.error().kind != ErrorKind::out_of_data) return image.error();
     return damaged("the video ends before its time stamps do");
   }
   const auto ticks = file_->ticks();
-  if (ticks && *ticks != parts_[part].scan.ticks[within])
+  if (ticks && !parts_[part].scan.counted && *ticks != parts_[part].scan.ticks[within])
     return damaged("a frame before this one doesn't decode");
   if (const ImageSize size = image->layout().size; size != parts_[part].scan.size)
     return size_changed(parts_[part].path.string(), static_cast<std::int64_t>(within), size,

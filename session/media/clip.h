@@ -37,6 +37,8 @@ class ClipReader {
 
  private:
   [[nodiscard]] std::size_t part_of(std::int64_t place) const;
+  /// Opens a part at its first frame.
+  Status open(std::size_t part);
 
   std::vector<ClipPart> parts_;
   Colours colours_;

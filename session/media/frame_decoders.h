@@ -8,6 +8,7 @@
 
 #include "base/result.h"
 #include "session/media/frame_file.h"
+#include "session/media/still_contents.h"
 
 // The decoders from which FrameFile chooses by the first bytes of a file.
 namespace emberlock::session {
@@ -19,10 +20,14 @@ enum class Alpha {
   over_black,  ///< colour times alpha: the light that the picture adds to a dark room
   dropped,     ///< colours as they are stored, for formats that use the alpha otherwise
 };
-/// `content` is the whole file; `where` names it in errors. Errors: truncated, damaged or too large; a TIFF
-/// whose fourth sample has no stated meaning and isn't opaque; a TIFF of grey and a second sample.
+/// The first picture. `content` is the whole file; `where` names it in errors. Errors: truncated, damaged or
+/// too large; a TIFF whose fourth sample has no stated meaning and isn't opaque; a TIFF of grey and a second
+/// sample.
 Result<Image> decode_still_image(std::string_view content, const std::string& where,
                                  Alpha alpha = Alpha::over_black);
+/// One of the pictures that examine_still() found in `file`; of a TIFF, the file's header is changed.
+Result<Image> decode_picture(std::string& file, const StillContents::Picture& picture,
+                             const std::string& where, Alpha alpha = Alpha::over_black);
 
 /// Of a whole PNG or JPEG, without decoding it. Errors: it is neither, or truncated.
 Result<ImageSize> picture_size(std::string_view content, const std::string& where);
@@ -34,8 +39,11 @@ bool is_fits(std::string_view head);
 /// upwards.
 Result<Image> decode_fits(std::string_view content, const std::string& where);
 
+/// Time stamps of a video's frames: with those that libavformat infers, or only those that the file holds.
+enum class Stamps { inferred, stored };
 /// Any file that libavformat recognises.
-Result<std::unique_ptr<FrameFile>> open_video(const std::filesystem::path& path, Colours colours);
+Result<std::unique_ptr<FrameFile>> open_video(const std::filesystem::path& path, Colours colours,
+                                              Stamps stamps = Stamps::inferred);
 
 /// Whether an image of this size may be decoded: both sides within 1..kMaxImageSide.
 Status check_image_size(std::int64_t width, std::int64_t height, const std::string& where);

@@ -5,9 +5,12 @@
 #include <array>
 #include <cctype>
 #include <optional>
+#include <regex>
 #include <set>
 #include <system_error>
+#include <tuple>
 
+#include "session/media/frame_file.h"
 #include "session/name.h"
 
 namespace emberlock::session {
@@ -16,15 +19,21 @@ namespace {
 
 enum class FileKind { video, picture, other };
 
+/// The extension in lower case, with its point.
+std::string ending_of(const fs::path& path) {
+  std::string ending = path.extension().string();
+  std::transform(ending.begin(), ending.end(), ending.begin(),
+                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  return ending;
+}
+
 FileKind kind_of(const fs::path& path) {
   constexpr std::array<std::string_view, 11> kPictures{".png", ".jpg", ".jpeg", ".tif", ".tiff", ".pgm",
                                                        ".ppm", ".pnm", ".fits", ".fit", ".fts"};
   constexpr std::array<std::string_view, 17> kOthers{"",     ".txt", ".md",   ".csv",  ".json", ".xml",
                                                      ".thm", ".lrv", ".html", ".pdf",  ".log",  ".yaml",
                                                      ".yml", ".wav", ".mp3",  ".toml", ".cr2"};
-  std::string ending = path.extension().string();
-  std::transform(ending.begin(), ending.end(), ending.begin(),
-                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  const std::string ending = ending_of(path);
   const auto among = [&](const auto& list) {
     return std::find(list.begin(), list.end(), ending) != list.end();
   };
@@ -46,6 +55,24 @@ std::optional<std::int64_t> last_number(const std::string& stem) {
   while (begin > 0 && is_digit(stem[begin - 1]) && end - begin < kMostDigits) --begin;
   if (begin == end) return {};
   return std::stoll(stem.substr(begin, end - begin));
+}
+
+/// Whether a TIFF holds several pictures.
+bool is_stack(const fs::path& file) {
+  if (const std::string ending = ending_of(file); ending != ".tif" && ending != ".tiff") return false;
+  const auto opened = FrameFile::open(file);
+  return opened.ok() && (*opened)->pictures() > 1;
+}
+
+/// A recording's chapters follow one another; in natural order those of all recordings would alternate.
+void sort_chapters(std::vector<fs::path>& files) {
+  const auto is_chapter = [](const fs::path& file) { return gopro_chapter(file).has_value(); };
+  if (!std::all_of(files.begin(), files.end(), is_chapter)) return;
+  std::stable_sort(files.begin(), files.end(), [](const fs::path& a, const fs::path& b) {
+    const auto one = gopro_chapter(a);
+    const auto other = gopro_chapter(b);
+    return std::tie(one->recording, one->chapter) < std::tie(other->recording, other->chapter);
+  });
 }
 
 bool hidden(const fs::path& path) { return path.filename().string().starts_with('.'); }
@@ -73,8 +100,14 @@ class Scan {
 
   void take_file(const fs::path& file) {
     if (left_out(file)) return;
-    if (kind_of(file) != FileKind::video) return pass_over(file);
-    found_.cameras.push_back({file.stem().string(), relative(file), CameraFiles::Kind::video, {file}, {}});
+    CameraFiles camera{file.stem().string(), relative(file), CameraFiles::Kind::video, {file}, {}};
+    if (is_stack(file)) {
+      camera.kind = CameraFiles::Kind::pictures;
+      camera.numbers = {0};
+    } else if (kind_of(file) != FileKind::video) {
+      return pass_over(file);
+    }
+    found_.cameras.push_back(std::move(camera));
   }
 
   Status take_subfolder(const fs::path& folder) {
@@ -90,6 +123,7 @@ class Scan {
       if (kind == FileKind::picture) pictures.files.push_back(file);
     }
     if (!videos.files.empty()) {
+      sort_chapters(videos.files);
       for (const fs::path& picture : pictures.files) pass_over(picture);
       found_.cameras.push_back(std::move(videos));
     } else if (!pictures.files.empty()) {
@@ -124,7 +158,8 @@ class Scan {
   Status number(CameraFiles& pictures) const {
     std::map<std::int64_t, fs::path> by_number;
     for (const fs::path& file : pictures.files) {
-      const auto number = last_number(file.stem().string());
+      auto number = last_number(file.stem().string());
+      if (!number && pictures.files.size() == 1 && is_stack(file)) number = 0;
       if (!number) {
         return Error{ErrorKind::bad_input, "the picture's name has no number", file.string(),
                      "Number the pictures by their instants, alike for all cameras"};
@@ -171,6 +206,14 @@ class Scan {
 };
 
 }  // namespace
+
+std::optional<GoProChapter> gopro_chapter(const fs::path& file) {
+  static const std::regex kName("G(?:OPR|[HXP]([0-9A-Z]{2}))([0-9]{4})", std::regex::icase);
+  std::smatch parts;
+  const std::string stem = file.stem().string();
+  if (!std::regex_match(stem, parts, kName)) return {};
+  return GoProChapter{parts[2], parts[1]};
+}
 
 bool natural_less(std::string_view a, std::string_view b) {
   std::size_t i = 0;

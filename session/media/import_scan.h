@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <map>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -18,9 +19,17 @@ struct CameraFiles {
   std::string id;    ///< name of the subfolder, or of the file without its extension
   std::string name;  ///< the subfolder or file, relative to the scanned folder
   Kind kind = Kind::video;
-  std::vector<std::filesystem::path> files{};  ///< in natural order: 9 before 10
-  std::vector<std::int64_t> numbers{};         ///< of pictures: the last number in each file name
+  std::vector<std::filesystem::path> files{};  ///< in natural order: 9 before 10; GoPro's by its chapters
+  std::vector<std::int64_t> numbers{};  ///< of pictures: the last number in each file name; 0 for a stack
 };
+
+/// The place of a file among those into which a GoPro camera splits its recordings.
+struct GoProChapter {
+  std::string recording;  ///< four digits
+  std::string chapter;    ///< two digits or letters; empty for the first one of older cameras
+};
+/// From the file's name: GHccrrrr, GXccrrrr, GPccrrrr or GOPRrrrr; nullopt for other names.
+std::optional<GoProChapter> gopro_chapter(const std::filesystem::path& file);
 
 struct FolderScan {
   std::vector<CameraFiles> cameras;      ///< sorted by id in natural order: 9 before 10
@@ -32,8 +41,9 @@ struct FolderScanOptions {
   std::vector<std::filesystem::path> without{};  ///< files to leave out
 };
 
-/// Assigns the files of a folder to cameras. Each video file in `folder` is a camera. Each subfolder is a
-/// camera too: all videos below it, or its pictures where there are no videos. Names that begin with a point
+/// Assigns the files of a folder to cameras. Each video file in `folder` is a camera, and each TIFF that
+/// holds several pictures. Each subfolder is a camera too: all videos below it, or its pictures where there
+/// are no videos. Names that begin with a point
 /// are skipped. Errors (bad_input): no films; an id that occurs twice or isn't a valid folder name; names of
 /// `ids` that don't exist; pictures without numbers, or two with the same number.
 Result<FolderScan> scan_folder(const std::filesystem::path& folder, const FolderScanOptions& options = {});

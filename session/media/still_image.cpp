@@ -10,27 +10,11 @@
 #include <opencv2/imgcodecs.hpp>
 
 #include "session/media/frame_decoders.h"
+#include "session/media/pnm_header.h"
+#include "session/media/still_contents.h"
 
 namespace emberlock::session {
 namespace {
-
-using Byte = unsigned char;
-
-Byte byte_at(std::string_view s, std::size_t i) { return static_cast<Byte>(s[i]); }
-std::uint32_t big16(std::string_view s, std::size_t i) {
-  return std::uint32_t{byte_at(s, i)} << 8 | byte_at(s, i + 1);
-}
-std::uint32_t big32(std::string_view s, std::size_t i) { return big16(s, i) << 16 | big16(s, i + 2); }
-
-bool is_pnm(std::string_view s) {
-  return s.size() > 2 && s[0] == 'P' && s[1] >= '1' && s[1] <= '6' &&
-         (std::isspace(byte_at(s, 2)) != 0 || s[2] == '#');
-}
-bool is_png(std::string_view s) { return s.starts_with("\x89PNG\r\n\x1a\n"); }
-bool is_jpeg(std::string_view s) { return s.starts_with("\xff\xd8\xff"); }
-bool is_tiff(std::string_view s) {
-  return s.starts_with(std::string_view("II*\0", 4)) || s.starts_with(std::string_view("MM\0*", 4));
-}
 
 Error truncated(const std::string& where, std::string_view kind) {
   return {ErrorKind::bad_input, "the " + std::string(kind) + " is truncated", where,
@@ -40,34 +24,6 @@ Error damaged(const std::string& where, std::string_view kind, std::string_view 
   return {ErrorKind::bad_input, "the " + std::string(kind) + " is damaged: " + std::string(reason), where,
           "Copy or record it again"};
 }
-
-/// The header of a binary PGM or PPM: numbers between white space and comments (netpbm's format definition).
-class PnmHeader {
- public:
-  explicit PnmHeader(std::string_view s) : s_(s) {}
-  std::optional<std::int64_t> number() {
-    skip_space();
-    std::int64_t v = 0;
-    const std::size_t first = at_;
-    for (; at_ < s_.size() && std::isdigit(byte_at(s_, at_)) != 0; ++at_) {
-      v = std::min<std::int64_t>(v * 10 + (s_[at_] - '0'), std::numeric_limits<std::int32_t>::max());
-    }
-    if (at_ == first) return std::nullopt;
-    return v;
-  }
-  /// A single white space ends the header; the samples follow.
-  [[nodiscard]] std::string_view samples() const { return s_.substr(std::min(at_ + 1, s_.size())); }
-
- private:
-  void skip_space() {
-    while (at_ < s_.size() && (std::isspace(byte_at(s_, at_)) != 0 || s_[at_] == '#')) {
-      if (s_[at_] == '#') at_ = std::min(s_.find('\n', at_), s_.size() - 1);
-      ++at_;
-    }
-  }
-  std::string_view s_;
-  std::size_t at_ = 2;
-};
 
 /// Binary PGM and PPM. Parsed here because OpenCV reports neither maxval nor truncation.
 Result<Image> decode_binary_pnm(std::string_view content, const std::string& where) {
@@ -98,134 +54,6 @@ Result<Image> decode_binary_pnm(std::string_view content, const std::string& whe
   return image;
 }
 
-/// How a still image stores what is transparent.
-enum class Transparency {
-  none,
-  straight,       ///< a fourth sample, by which the colours are not multiplied yet
-  premultiplied,  ///< a fourth sample, by which they are
-  unnamed,        ///< a fourth sample of no stated meaning
-  grey_key,       ///< pixels of the grey value `key`
-};
-
-struct StillSize {
-  std::int64_t width = 0;
-  std::int64_t height = 0;
-  Transparency transparency = Transparency::none;
-  std::uint32_t key = 0;
-  bool is_grey = false;  ///< looked at where there is a fourth sample
-};
-
-/// The grey value of a PNG's chunk tRNS, as a decoded sample.
-std::uint32_t grey_key(std::string_view s, std::size_t chunk) {
-  const unsigned depth = byte_at(s, 24);
-  const std::uint32_t value = big16(s, chunk + 8);
-  return depth < 8 ? value * 255 / ((1U << depth) - 1) : value;
-}
-
-/// Walks the chunks of a PNG to its end.
-Result<StillSize> check_png(std::string_view s, const std::string& where) {
-  if (s.size() < 33) return truncated(where, "PNG");
-  StillSize size{big32(s, 16), big32(s, 20)};
-  const Byte colours = byte_at(s, 25);  // 0 grey, 2 RGB, 3 palette, 4 grey and alpha, 6 RGB and alpha
-  size.is_grey = colours == 4;
-  if (colours == 4 || colours == 6) size.transparency = Transparency::straight;
-  for (std::size_t at = 8; at + 12 <= s.size();) {
-    if (s.substr(at + 4, 4) == "IEND") return size;
-    const std::size_t length = big32(s, at);
-    if (length > s.size() - at - 12) break;
-    if (s.substr(at + 4, 4) == "tRNS" && length >= 2 && colours == 0) {
-      size.transparency = Transparency::grey_key;
-      size.key = grey_key(s, at);
-    } else if (s.substr(at + 4, 4) == "tRNS" && colours <= 3) {
-      size.transparency = Transparency::straight;
-    }
-    at += 12 + length;
-  }
-  return truncated(where, "PNG");
-}
-
-/// Walks the markers of a JPEG to its first scan, and looks for the end marker behind it.
-Result<StillSize> check_jpeg(std::string_view s, const std::string& where) {
-  StillSize size;
-  for (std::size_t at = 2; at + 4 <= s.size();) {
-    if (byte_at(s, at) != 0xff) return damaged(where, "JPEG", "a marker is missing");
-    const Byte marker = byte_at(s, at + 1);
-    if (marker == 0xff) {  // fill byte
-      ++at;
-      continue;
-    }
-    if (marker == 0xda) {
-      if (size.width == 0) return damaged(where, "JPEG", "no size before the first scan");
-      if (s.find("\xff\xd9", at) == std::string_view::npos) break;
-      return size;
-    }
-    const bool frame_header =
-        marker >= 0xc0 && marker <= 0xcf && marker != 0xc4 && marker != 0xc8 && marker != 0xcc;
-    if (frame_header && at + 9 <= s.size()) size = {big16(s, at + 7), big16(s, at + 5)};
-    at += 2 + std::size_t{big16(s, at + 2)};
-  }
-  return truncated(where, "JPEG");
-}
-
-/// The meaning of a TIFF's sample after the colours (tag 338).
-Transparency transparency_of(std::uint32_t extra_sample) {
-  if (extra_sample == 1) return Transparency::premultiplied;
-  return extra_sample == 2 ? Transparency::straight : Transparency::unnamed;
-}
-
-/// Reads width, height and samples from the first directory of a TIFF (tags 256, 257, 258, 277 and 338).
-Result<StillSize> check_tiff(std::string_view s, const std::string& where) {
-  const bool big = s[0] == 'M';
-  const auto get16 = [&](std::size_t i) {
-    return big ? big16(s, i) : std::uint32_t{byte_at(s, i + 1)} << 8 | byte_at(s, i);
-  };
-  const auto get32 = [&](std::size_t i) { return big ? big32(s, i) : get16(i + 2) << 16 | get16(i); };
-  if (s.size() < 8) return truncated(where, "TIFF");
-  const std::size_t directory = get32(4);
-  if (directory + 2 > s.size()) return truncated(where, "TIFF");
-  const std::size_t entries = get16(directory);
-  if (directory + 2 + entries * 12 > s.size()) return truncated(where, "TIFF");
-  StillSize size;
-  std::uint32_t samples = 1;
-  std::uint32_t bits = 8;
-  std::uint32_t extra = 0;
-  for (std::size_t i = 0; i < entries; ++i) {
-    const std::size_t entry = directory + 2 + i * 12;
-    const bool is_short = get16(entry + 2) == 3;
-    // More than two short values stand elsewhere; the first one is enough.
-    const std::size_t elsewhere = is_short && get32(entry + 4) > 2 ? get32(entry + 8) : entry + 8;
-    if (elsewhere + 4 > s.size()) continue;  // the decoder refuses it
-    const std::uint32_t value = is_short ? get16(elsewhere) : get32(elsewhere);
-    switch (get16(entry)) {
-      case 256:
-        size.width = value;
-        break;
-      case 257:
-        size.height = value;
-        break;
-      case 258:
-        bits = value;
-        break;
-      case 277:
-        samples = value;
-        break;
-      case 338:
-        extra = value;
-        break;
-      default:
-        break;
-    }
-  }
-  if (samples == 2)
-    return Error{ErrorKind::bad_input, "the TIFF has grey and a second sample, which isn't read", where,
-                 "Convert it to PNG"};
-  if (samples == 4) size.transparency = transparency_of(extra);
-  // The decoder multiplies samples of 8 bits.
-  if (size.transparency == Transparency::straight && bits <= 8)
-    size.transparency = Transparency::premultiplied;
-  return size;
-}
-
 /// Blue, green, red and alpha, as OpenCV stores them, over black: colour times alpha, without the alpha.
 template <class Sample>
 cv::Mat over_black(const cv::Mat& mat, bool multiply) {
@@ -251,7 +79,7 @@ bool is_opaque(const cv::Mat& mat) {
 }
 
 /// What the decoded image shows over black.
-Result<cv::Mat> without_transparency(const cv::Mat& mat, const StillSize& still, Alpha alpha,
+Result<cv::Mat> without_transparency(const cv::Mat& mat, const StillContents::Picture& still, Alpha alpha,
                                      const std::string& where) {
   const bool wide = mat.depth() == CV_16U;
   if (mat.channels() == 1 && still.transparency == Transparency::grey_key && alpha == Alpha::over_black) {
@@ -308,28 +136,36 @@ bool is_still_image(std::string_view head) {
 Result<ImageSize> picture_size(std::string_view content, const std::string& where) {
   if (!is_png(content) && !is_jpeg(content))
     return Error{ErrorKind::bad_input, "is neither a PNG nor a JPEG", where, "Convert it"};
-  EMBERLOCK_ASSIGN_OR_RETURN(const StillSize size,
-                             is_png(content) ? check_png(content, where) : check_jpeg(content, where));
-  EMBERLOCK_RETURN_IF_ERROR(check_image_size(size.width, size.height, where));
-  return ImageSize{static_cast<int>(size.width), static_cast<int>(size.height)};
+  EMBERLOCK_ASSIGN_OR_RETURN(const StillContents found, examine_still(content, where));
+  const StillContents::Picture& picture = found.pictures.front();
+  EMBERLOCK_RETURN_IF_ERROR(check_image_size(picture.width, picture.height, where));
+  return ImageSize{static_cast<int>(picture.width), static_cast<int>(picture.height)};
 }
 
 Result<Image> decode_still_image(std::string_view content, const std::string& where, Alpha alpha) {
+  EMBERLOCK_ASSIGN_OR_RETURN(const StillContents found, examine_still(content, where));
+  std::string file(content);
+  return decode_picture(file, found.pictures.front(), where, alpha);
+}
+
+Result<Image> decode_picture(std::string& file, const StillContents::Picture& picture,
+                             const std::string& where, Alpha alpha) {
+  std::string_view content = file;
+  if (is_tiff(content)) {
+    select_tiff_page(file, picture);
+  } else {
+    content = content.substr(picture.begin, picture.end - picture.begin);
+  }
   if (is_pnm(content) && (content[1] == '5' || content[1] == '6')) return decode_binary_pnm(content, where);
   // OpenCV allocates whatever the header states and accepts truncated files, so both are checked first.
-  StillSize still;
-  if (!is_pnm(content)) {
-    EMBERLOCK_ASSIGN_OR_RETURN(still, is_png(content)    ? check_png(content, where)
-                                      : is_jpeg(content) ? check_jpeg(content, where)
-                                                         : check_tiff(content, where));
-    EMBERLOCK_RETURN_IF_ERROR(check_image_size(still.width, still.height, where));
-  }
+  if (!is_pnm(content)) EMBERLOCK_RETURN_IF_ERROR(check_image_size(picture.width, picture.height, where));
+  if (is_jpeg(content)) EMBERLOCK_RETURN_IF_ERROR(examine_still(content, where));
   if (content.size() > static_cast<std::size_t>(std::numeric_limits<int>::max())) {
     return Error{ErrorKind::bad_input, "larger than 2 GiB", where, "Crop the image"};
   }
   // As stored: an EXIF orientation is ignored, because rows and columns must be the sensor's.
   const bool has_alpha =
-      still.transparency != Transparency::none && still.transparency != Transparency::grey_key;
+      picture.transparency != Transparency::none && picture.transparency != Transparency::grey_key;
   const int flags = has_alpha ? cv::IMREAD_UNCHANGED
                               : cv::IMREAD_ANYCOLOR | cv::IMREAD_ANYDEPTH | cv::IMREAD_IGNORE_ORIENTATION;
   try {
@@ -337,7 +173,7 @@ Result<Image> decode_still_image(std::string_view content, const std::string& wh
     const cv::Mat bytes(1, static_cast<int>(content.size()), CV_8U, const_cast<char*>(content.data()));
     const cv::Mat mat = cv::imdecode(bytes, flags);
     if (mat.empty()) return damaged(where, "image", "it can't be decoded");
-    EMBERLOCK_ASSIGN_OR_RETURN(const cv::Mat shown, without_transparency(mat, still, alpha, where));
+    EMBERLOCK_ASSIGN_OR_RETURN(const cv::Mat shown, without_transparency(mat, picture, alpha, where));
     return from_mat(shown, where);
   } catch (const cv::Exception& e) {
     return damaged(where, "image", e.err);

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 extern "C" {
+#include <libavutil/display.h>
 #include <libavutil/pixdesc.h>
 #include <libswscale/swscale.h>
 }
@@ -98,32 +99,70 @@ AVPixelFormat scaled_format(PixelFormat format) {
   return wide ? AV_PIX_FMT_GRAY16LE : AV_PIX_FMT_GRAY8;
 }
 
+/// The coefficients by which brightness and colour differences are decoded; nullopt for codings that no
+/// matrix describes. Untagged video is BT.601 in standard definition and BT.709 above, as players take it.
+std::optional<int> matrix_of(const AVFrame& frame) {
+  switch (frame.colorspace) {
+    case AVCOL_SPC_RGB:  // no matrix is applied
+    case AVCOL_SPC_BT470BG:
+    case AVCOL_SPC_SMPTE170M:
+      return SWS_CS_ITU601;
+    case AVCOL_SPC_BT709:
+      return SWS_CS_ITU709;
+    case AVCOL_SPC_FCC:
+      return SWS_CS_FCC;
+    case AVCOL_SPC_SMPTE240M:
+      return SWS_CS_SMPTE240M;
+    case AVCOL_SPC_BT2020_NCL:
+      return SWS_CS_BT2020;
+    case AVCOL_SPC_UNSPECIFIED:
+    case AVCOL_SPC_RESERVED:
+      return frame.height >= 720 || frame.width >= 1280 ? SWS_CS_ITU709 : SWS_CS_ITU601;
+    default:
+      return {};
+  }
+}
+
+std::vector<std::string> unapplied_fields(const AVStream& stream) {
+  std::vector<std::string> fields;
+  const VideoDisplay display = display_of(stream);
+  if (display.matrix) {
+    const auto& m = *display.matrix;
+    const bool mirrors = std::int64_t{m[0]} * m[4] < std::int64_t{m[1]} * m[3];
+    const long degrees = std::lround(360 - av_display_rotation_get(m.data())) % 360;
+    fields.push_back("the display matrix (" + std::string(mirrors ? "mirrored, " : "") + "turned by " +
+                     std::to_string(degrees) + " degrees) isn't applied");
+  }
+  if (!display.square()) {
+    fields.push_back("pixels of " + std::to_string(display.pixel_width) + ":" +
+                     std::to_string(display.pixel_height) + " aren't made square");
+  }
+  const AVColorTransferCharacteristic transfer = stream.codecpar->color_trc;
+  if (transfer == AVCOL_TRC_SMPTE2084 || transfer == AVCOL_TRC_ARIB_STD_B67) {
+    fields.push_back("the transfer function " + std::string(av_color_transfer_name(transfer)) +
+                     " isn't applied");
+  }
+  return fields;
+}
+
 class VideoFile final : public FrameFile {
  public:
-  VideoFile(AvInput input, std::string where, Colours colours)
+  VideoFile(AvInput input, std::string where, Colours colours, Checking checking)
       : input_(std::move(input)),
+        checking_(checking),
         packet_(av_packet_alloc()),
         frame_(av_frame_alloc()),
         where_(std::move(where)),
         colours_(colours) {}
 
   Result<Image> next() override {
-    for (;;) {
-      const int code = avcodec_receive_frame(input_.decoder.get(), frame_.get());
-      if (code == 0) {
-        const std::int64_t here = frame_->best_effort_timestamp;
-        if (wanted_ && here != AV_NOPTS_VALUE && here < *wanted_) continue;
-        if (wanted_ && here != *wanted_ && jumped_) {  // the index led past the wanted frame
-          EMBERLOCK_RETURN_IF_ERROR(start_anew());
-          continue;
-        }
-        wanted_.reset();
-        return convert();
-      }
-      if (code == AVERROR_EOF) return end();
-      if (code != AVERROR(EAGAIN)) return damaged(av_message(code));
-      EMBERLOCK_RETURN_IF_ERROR(feed());
-    }
+    EMBERLOCK_RETURN_IF_ERROR(decode());
+    return convert();
+  }
+
+  Status skip(std::int64_t frames) override {
+    for (; frames > 0; --frames) EMBERLOCK_RETURN_IF_ERROR(decode());
+    return {};
   }
 
   Status seek(std::int64_t ticks) override {
@@ -136,7 +175,11 @@ class VideoFile final : public FrameFile {
   }
 
   [[nodiscard]] std::optional<std::int64_t> ticks() const override {
-    return last_pts_ == AV_NOPTS_VALUE ? std::nullopt : std::optional(last_pts_);
+    return stamp_ == AV_NOPTS_VALUE ? std::nullopt : std::optional(stamp_);
+  }
+
+  [[nodiscard]] std::vector<std::string> unapplied() const override {
+    return unapplied_fields(*input_.format->streams[input_.stream]);
   }
 
   [[nodiscard]] VideoClaims claims() const override {
@@ -156,10 +199,38 @@ class VideoFile final : public FrameFile {
   }
 
  private:
+  /// Decodes the next frame into `frame_`.
+  Status decode() {
+    for (;;) {
+      const int code = avcodec_receive_frame(input_.decoder.get(), frame_.get());
+      if (code == 0) {
+        const std::int64_t here = frame_->best_effort_timestamp;
+        if (wanted_ && here != AV_NOPTS_VALUE && here < *wanted_) continue;
+        if (wanted_ && here != *wanted_ && jumped_) {  // the index led past the wanted frame
+          EMBERLOCK_RETURN_IF_ERROR(start_anew());
+          continue;
+        }
+        wanted_.reset();
+        ++count_;
+        stamp_ = frame_->pts;
+        if (here != AV_NOPTS_VALUE) last_pts_ = here;
+        if (frame_->decode_error_flags == 0 && (frame_->flags & AV_FRAME_FLAG_CORRUPT) == 0) return {};
+        return damaged("its data don't decode");
+      }
+      if (code == AVERROR_EOF && wanted_ && jumped_) {  // the index led behind the last key frame
+        EMBERLOCK_RETURN_IF_ERROR(start_anew());
+        continue;
+      }
+      if (code == AVERROR_EOF) return end();
+      if (code != AVERROR(EAGAIN)) return damaged(av_message(code));
+      EMBERLOCK_RETURN_IF_ERROR(feed());
+    }
+  }
+
   Status start_anew() {
     jumped_ = false;
     damage_.clear();
-    EMBERLOCK_ASSIGN_OR_RETURN(AvInput fresh, open_av_input(where_, Checking::lenient));
+    EMBERLOCK_ASSIGN_OR_RETURN(AvInput fresh, open_av_input(where_, checking_));
     input_.format.reset();  // before the file that it reads
     input_ = std::move(fresh);
     return {};
@@ -226,12 +297,7 @@ class VideoFile final : public FrameFile {
   }
 
   Result<Image> convert() {
-    ++count_;
-    if (frame_->best_effort_timestamp != AV_NOPTS_VALUE) last_pts_ = frame_->best_effort_timestamp;
     EMBERLOCK_RETURN_IF_ERROR(check_image_size(frame_->width, frame_->height, where_));
-    if (frame_->decode_error_flags != 0 || (frame_->flags & AV_FRAME_FLAG_CORRUPT) != 0) {
-      return damaged("its data don't decode");
-    }
     const Target target = target_of(*frame_, colours_);
     Image image(target.layout);
     if (target.transfer == Transfer::rows) copy_rows(*frame_, image);
@@ -241,16 +307,22 @@ class VideoFile final : public FrameFile {
   }
 
   Result<Image> rescale(Image image) {
+    const auto matrix = matrix_of(*frame_);
+    if (!matrix && channels(image.layout().format) == 3) {
+      const char* const name = av_color_space_name(frame_->colorspace);
+      return Error{ErrorKind::bad_input,
+                   "its colours are coded as " + std::string(name != nullptr ? name : "an unknown kind"),
+                   position(), "Convert the video to BT.709"};
+    }
     const int flags = SWS_BICUBIC | SWS_ACCURATE_RND | SWS_FULL_CHR_H_INT | SWS_FULL_CHR_H_INP | SWS_BITEXACT;
     scaler_.reset(sws_getCachedContext(scaler_.release(), frame_->width, frame_->height,
                                        static_cast<AVPixelFormat>(frame_->format), frame_->width,
                                        frame_->height, scaled_format(image.layout().format), flags, nullptr,
                                        nullptr, nullptr));
     if (!scaler_) return damaged("its pixel format can't be converted");
-    const int matrix = frame_->colorspace == AVCOL_SPC_BT709 ? SWS_CS_ITU709 : SWS_CS_DEFAULT;
     const int full_in = frame_->color_range == AVCOL_RANGE_JPEG ? 1 : 0;
     // libswscale refuses this for RGB input, where it isn't needed.
-    sws_setColorspaceDetails(scaler_.get(), sws_getCoefficients(matrix), full_in,
+    sws_setColorspaceDetails(scaler_.get(), sws_getCoefficients(matrix.value_or(SWS_CS_DEFAULT)), full_in,
                              sws_getCoefficients(SWS_CS_DEFAULT), 1, 0, 1 << 16, 1 << 16);
     // libswscale may write beyond the end of a row, so it writes to a padded row, which is then copied.
     const bool planar = image.layout().format == PixelFormat::rgb8;
@@ -289,6 +361,7 @@ class VideoFile final : public FrameFile {
   }
 
   AvInput input_;
+  Checking checking_;
   AvPtr<AVPacket> packet_;
   AvPtr<AVFrame> frame_;
   std::unique_ptr<SwsContext, SwsFree> scaler_;
@@ -296,18 +369,22 @@ class VideoFile final : public FrameFile {
   std::string where_;
   Colours colours_;
   std::uint64_t count_ = 0;
-  std::optional<std::int64_t> wanted_{};  ///< frames before this time stamp are skipped
-  bool jumped_ = false;                   ///< the index was used to seek to `wanted_`
-  std::string damage_;                    ///< what ends the film before its end; else empty
-  std::int64_t last_pts_ = AV_NOPTS_VALUE;
+  std::optional<std::int64_t> wanted_{};    ///< frames before this time stamp are skipped
+  bool jumped_ = false;                     ///< the index was used to seek to `wanted_`
+  std::string damage_;                      ///< what ends the film before its end; else empty
+  std::int64_t stamp_ = AV_NOPTS_VALUE;     ///< that the file holds for the last frame
+  std::int64_t last_pts_ = AV_NOPTS_VALUE;  ///< stated or estimated, of the last frame that has one
 };
 
 }  // namespace
 
-Result<std::unique_ptr<FrameFile>> open_video(const std::filesystem::path& path, Colours colours) {
-  EMBERLOCK_ASSIGN_OR_RETURN(AvInput input, open_av_input(path, Checking::lenient));
+Result<std::unique_ptr<FrameFile>> open_video(const std::filesystem::path& path, Colours colours,
+                                              Stamps stamps) {
+  const Checking checking = stamps == Stamps::stored ? Checking::unfilled : Checking::lenient;
+  EMBERLOCK_ASSIGN_OR_RETURN(AvInput input, open_av_input(path, checking));
   EMBERLOCK_RETURN_IF_ERROR(check_image_size(input.decoder->width, input.decoder->height, path.string()));
-  return std::unique_ptr<FrameFile>(std::make_unique<VideoFile>(std::move(input), path.string(), colours));
+  return std::unique_ptr<FrameFile>(
+      std::make_unique<VideoFile>(std::move(input), path.string(), colours, checking));
 }
 
 }  // namespace emberlock::session

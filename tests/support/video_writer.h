@@ -27,6 +27,7 @@ struct VideoFormat {
   const char* preset = "veryfast";  ///< of x264
   AVRational rate{24000, 1001};     ///< what the file claims
   int gop = 0;                      ///< frames from one key to the next; the codec's own where 0
+  int b_frames = -1;                ///< between two others; the codec's own number where -1
   bool tinted = false;              ///< what is bright is orange, as flames are; H.264
 };
 
@@ -51,6 +52,7 @@ class VideoWriter {
                                                     : AV_PIX_FMT_YUV420P;
     c.thread_count = 1;
     if (format.gop > 0) c.gop_size = format.gop;
+    if (format.b_frames >= 0) c.max_b_frames = format.b_frames;
     tinted_ = format.tinted;
     if (format.codec == AV_CODEC_ID_H264) {
       av_opt_set_int(c.priv_data, "crf", format.crf, 0);

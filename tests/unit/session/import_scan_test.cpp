@@ -50,6 +50,42 @@ TEST(ImportScan, TellsWhichFileIsWhoseAndWhatIsNone) {
   EXPECT_EQ(scan->passed_over.size(), 3U);
 }
 
+TEST(ImportScan, KeepsTheChaptersOfAGoProRecordingTogether) {
+  struct Row {
+    const char* name;
+    const char* recording;  // nullptr: of another camera
+    const char* chapter = "";
+  };
+  for (const auto& [name, recording, chapter] : std::vector<Row>{{"GH010123.MP4", "0123", "01"},
+                                                                 {"GX120007.mp4", "0007", "12"},
+                                                                 {"GOPR0042.MP4", "0042"},
+                                                                 {"GP030042.MP4", "0042", "03"},
+                                                                 {"gh020123.mp4", "0123", "02"},
+                                                                 {"GHAB0123.MP4", "0123", "AB"},
+                                                                 {"MVI_0123.MOV", nullptr},
+                                                                 {"GH0123.MP4", nullptr},
+                                                                 {"GH010123x.MP4", nullptr}}) {
+    const auto found = gopro_chapter(name);
+    ASSERT_EQ(found.has_value(), recording != nullptr) << name;
+    if (!found) continue;
+    EXPECT_EQ(found->recording, recording);
+    EXPECT_EQ(found->chapter, chapter);
+  }
+  const test::TempFolder temp;
+  for (const char* file : {"GH010123", "GH010124", "GH020123", "GH020124", "GH110123", "GH100123"})
+    touch(temp / "in/left" / (std::string(file) + ".MP4"));
+  for (const char* file : {"GOPR0001", "GOPR0002", "GP010001", "GP010002"})
+    touch(temp / "in/old" / (std::string(file) + ".MP4"));
+  const auto scan = scan_folder(temp / "in");
+  ASSERT_TRUE(scan.ok()) << scan.error().message();
+  std::vector<std::string> names;
+  for (const CameraFiles& camera : scan->cameras) {
+    for (const auto& file : camera.files) names.push_back(file.stem());
+  }
+  EXPECT_THAT(names, ElementsAre("GH010123", "GH020123", "GH100123", "GH110123", "GH010124", "GH020124",
+                                 "GOPR0001", "GP010001", "GOPR0002", "GP010002"));
+}
+
 TEST(ImportScan, NamesWhatCannotBeTold) {
   const test::TempFolder temp;
   touch(temp / "a/cam.mp4");

@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 
 #include "base/file.h"
+#include "base/kind_of_file.h"
 #include "recon/calibrate/pose.h"
 #include "recon/calibrate/transforms.h"
 
@@ -30,7 +31,7 @@ Result<v1::Rig> import_colmap(const fs::path& folder) {
 }
 
 bool is_opencv_name(const fs::path& path) {
-  const std::string extension = path.extension();
+  const std::string extension = lower_extension(path);
   return extension == ".yml" || extension == ".yaml" || extension == ".xml";
 }
 

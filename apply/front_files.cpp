@@ -6,6 +6,7 @@
 
 #include <fmt/format.h>
 
+#include "base/kind_of_file.h"
 #include "recon/export/exr_file.h"
 #include "session/media/import_scan.h"
 #include "session/media/video_scan.h"
@@ -42,7 +43,7 @@ Result<FrontFiles::Pictures> FrontFiles::pictures_of(const fs::path& path, const
                  "Name a picture or a folder of pictures"};
   if (!fs::is_directory(path, ec)) {
     pictures.files = {path};
-    if (path.extension() == ".exr") return pictures;
+    if (lower_extension(path) == ".exr") return pictures;
     EMBERLOCK_ASSIGN_OR_RETURN(const session::VideoScan scan, session::scan_video(path));
     pictures.video = scan.frames() > 1;
     if (pictures.video && scan.frames() < frames)
@@ -101,7 +102,7 @@ Result<Image> FrontFiles::mask_image() {
 
 Result<std::vector<float>> FrontFiles::depth_of(const fs::path& file) const {
   std::vector<float> metres;
-  if (file.extension() == ".exr") {
+  if (lower_extension(file) == ".exr") {
     EMBERLOCK_ASSIGN_OR_RETURN(recon::ExrValues read, recon::read_exr(file, {"Z", "Y", "R"}));
     EMBERLOCK_RETURN_IF_ERROR(size_is_right(read.size, file));
     metres = std::move(read.values);

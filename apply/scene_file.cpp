@@ -12,6 +12,7 @@
 #include "apply/kernels/flame_table.h"
 #include "apply/unreadable.h"
 #include "base/file.h"
+#include "base/kind_of_file.h"
 #include "base/nesting.h"
 
 namespace emberlock::apply {
@@ -167,7 +168,8 @@ Result<SceneFile> parse_scene(std::string_view text, const std::string& where, c
 }
 
 Result<SceneFile> read_scene(const fs::path& file) {
-  if (file.extension() == ".glb" || file.extension() == ".gltf") return scene_in_gltf(file);
+  const std::string extension = lower_extension(file);
+  if (extension == ".glb" || extension == ".gltf") return scene_in_gltf(file);
   constexpr std::size_t kMostBytes = std::size_t{16} << 20;
   EMBERLOCK_ASSIGN_OR_RETURN(const std::string text, read_file(file, kMostBytes));
   return parse_scene(text, file.string(), file.parent_path());

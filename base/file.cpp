@@ -8,6 +8,7 @@
 #include <fcntl.h>
 #include <sys/stat.h>
 
+#include "base/kind_of_file.h"
 #include "base/unique_fd.h"
 
 namespace emberlock {
@@ -38,16 +39,9 @@ Status write_all(int fd, std::string_view content, const fs::path& path) {
 }  // namespace
 
 Result<std::string> read_file(const fs::path& path, std::size_t max_bytes) {
-  const UniqueFd fd(::open(path.c_str(), O_RDONLY | O_CLOEXEC));
-  if (!fd) {
-    Error e = system_error(path, "cannot open", "Check the path and its permissions");
-    e.kind = ErrorKind::bad_input;
-    return e;
-  }
+  EMBERLOCK_ASSIGN_OR_RETURN(const UniqueFd fd, open_regular_file(path));
   struct stat info {};
   if (::fstat(fd.get(), &info) != 0) return system_error(path, "cannot stat");
-  if (!S_ISREG(info.st_mode))
-    return Error{ErrorKind::bad_input, "not a regular file", path.string(), "Name a file"};
   if (static_cast<std::size_t>(info.st_size) > max_bytes) {
     return Error{ErrorKind::bad_input, "larger than the " + std::to_string(max_bytes) + " bytes allowed here",
                  path.string(), "Check that this is the file you mean"};

@@ -16,6 +16,7 @@
 #include "base/output_leftovers.h"
 #include "base/output_survey.h"
 #include "base/result_list.h"
+#include "base/sha256.h"
 
 namespace emberlock {
 namespace fs = std::filesystem;
@@ -67,7 +68,11 @@ Result<Contents> contents_of(const fs::path& staging, const std::string& verb) {
     if (::lstat(at->path().c_str(), &info) != 0) return refused_by_system(at->path(), "cannot look at it");
     if (S_ISDIR(info.st_mode)) contents.folders.push_back(at->path());
     const std::string name = at->path().lexically_relative(staging).string();
-    if (S_ISREG(info.st_mode) && name != kResultList) contents.files.push_back(listed_as(name, verb, info));
+    if (!S_ISREG(info.st_mode) || name == kResultList) continue;
+    contents.files.push_back(listed_as(name, verb, info));
+    if (verb.empty()) continue;
+    EMBERLOCK_ASSIGN_OR_RETURN(const FileHash hash, hash_file(at->path()));
+    contents.files.back().sha256 = hash.sha256;
   }
   if (ec) return Error{ErrorKind::io, "cannot read the folder: " + ec.message(), staging.string()};
   std::sort(contents.files.begin(), contents.files.end(),

@@ -19,7 +19,7 @@ namespace emberlock {
 struct Survey;
 
 /// The list of a result's files, stored in the result's folder: {"format": "emberlock result", "version": 1,
-/// "files": [{"path", "verb", "bytes", "modified_ns"}]}. Only this list makes a folder an earlier result.
+/// "files": [{"path", "verb", "bytes", "modified_ns", "sha256"}]}. Only it makes a folder an earlier result.
 /// Files that it doesn't name, or that changed since, belong to somebody else.
 inline constexpr const char* kResultList = "emberlock-files.json";
 

@@ -106,7 +106,8 @@ bool discard(const fs::path& folder, const fs::path& target) {
   for (const ListedFile& file : list->files) listed.emplace(file.path, &file);
   remove_ours(folder, [&](const std::string& path, const struct stat& info) {
     const auto known = listed.find(path);
-    return (known != listed.end() && is_unchanged(*known->second, info)) || same_inode(target / path, info);
+    return (known != listed.end() && is_unchanged(*known->second, folder / path, info)) ||
+           same_inode(target / path, info);
   });
   std::error_code ec;
   if (std::distance(fs::directory_iterator(folder, ec), {}) == 1) ::unlink((folder / kResultList).c_str());

@@ -84,9 +84,9 @@ class Surveyor {
       found_.kept.push_back({std::move(name), false, std::nullopt});
       return {};
     }
-    const bool unchanged = is_unchanged(known->second, info);
+    const bool unchanged = is_unchanged(known->second, path, info);
     if (is_own(known->second)) {
-      if (!unchanged) return changed(path);
+      if (!unchanged) return known->second.sha256.empty() ? of_another_time(path) : changed(path);
       found_.replaced.push_back(std::move(name));
     } else {
       found_.kept.push_back(
@@ -97,6 +97,11 @@ class Surveyor {
 
   static Error changed(const fs::path& path) {
     return in_the_way(path, "was changed since Emberlock made it, so it isn't replaced",
+                      "Move it away, or name a new folder");
+  }
+  static Error of_another_time(const fs::path& path) {
+    return in_the_way(path,
+                      "has another size or time than in the list of Emberlock's files, so it isn't replaced",
                       "Move it away, or name a new folder");
   }
   [[nodiscard]] bool is_own(const ListedFile& file) const { return file.verb == verb_.name; }

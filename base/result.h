@@ -25,7 +25,7 @@ struct Error {
   std::string where = {};
   std::string remedy = {};
 
-  /// "where: what. remedy" on one line.
+  /// "where: what. remedy" on one line; the first two end in "..." beyond 2000 bytes each.
   [[nodiscard]] std::string message() const;
 };
 

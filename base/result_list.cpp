@@ -9,6 +9,7 @@
 #include "base/file.h"
 #include "base/nesting.h"
 #include "base/output_folder.h"
+#include "base/sha256.h"
 
 namespace emberlock {
 namespace fs = std::filesystem;
@@ -39,6 +40,8 @@ std::optional<ListedFile> file_of(const ordered_json& entry) {
   ListedFile file{path->get<std::string>(), verb->get<std::string>(), bytes->get<std::uint64_t>(),
                   modified->get<std::int64_t>()};
   if (!leads_inside(file.path)) return std::nullopt;
+  if (const auto hash = entry.find("sha256"); hash != end && hash->is_string())
+    file.sha256 = hash->get<std::string>();
   return file;
 }
 
@@ -81,6 +84,7 @@ std::string result_list_text(const ResultList& list) {
   for (const ListedFile& file : list.files) {
     json["files"].push_back(
         {{"path", file.path}, {"verb", file.verb}, {"bytes", file.bytes}, {"modified_ns", file.modified_ns}});
+    if (!file.sha256.empty()) json["files"].back()["sha256"] = file.sha256;
   }
   // A name that isn't UTF-8 doesn't survive the round trip. Its file then counts as somebody else's and is
   // kept.
@@ -92,10 +96,14 @@ ListedFile listed_as(std::string path, std::string verb, const struct stat& info
           std::int64_t{info.st_mtim.tv_sec} * 1'000'000'000 + info.st_mtim.tv_nsec};
 }
 
-bool is_unchanged(const ListedFile& listed, const struct stat& info) {
+bool is_unchanged(const ListedFile& listed, const fs::path& path, const struct stat& info) {
   if (!S_ISREG(info.st_mode)) return false;
   const ListedFile now = listed_as({}, {}, info);
-  return now.bytes == listed.bytes && now.modified_ns == listed.modified_ns;
+  if (now.bytes != listed.bytes) return false;
+  if (now.modified_ns == listed.modified_ns) return true;
+  if (listed.sha256.empty()) return false;
+  const auto hash = hash_file(path);
+  return hash.ok() && hash->sha256 == listed.sha256;
 }
 
 }  // namespace emberlock

@@ -18,6 +18,7 @@ struct ListedFile {
   std::string verb;
   std::uint64_t bytes = 0;
   std::int64_t modified_ns = 0;
+  std::string sha256 = {};  ///< of its bytes; empty in lists of versions before 0.3
 };
 
 /// The content of kResultList.
@@ -31,9 +32,10 @@ struct ResultList {
 Result<ResultList> read_result_list(const std::filesystem::path& folder);
 std::string result_list_text(const ResultList& list);
 
-/// Describes a regular file from its stat().
+/// Describes a regular file from its stat(), without its hash.
 ListedFile listed_as(std::string path, std::string verb, const struct stat& info);
-/// Whether the file is still as listed.
-bool is_unchanged(const ListedFile& listed, const struct stat& info);
+/// Whether the file at `path` is still as listed: by its size and time, or, as a copy has another time, by
+/// its bytes.
+bool is_unchanged(const ListedFile& listed, const std::filesystem::path& path, const struct stat& info);
 
 }  // namespace emberlock

@@ -10,6 +10,7 @@
 #include <openssl/evp.h>
 
 #include "base/hex.h"
+#include "base/kind_of_file.h"
 
 namespace emberlock {
 namespace {
@@ -48,6 +49,7 @@ std::string sha256(std::string_view bytes) {
 bool is_sha256(std::string_view text) { return is_hex(text, kSha256Digits); }
 
 Result<FileHash> hash_file(const std::filesystem::path& path, const Observer& observer) {
+  EMBERLOCK_RETURN_IF_ERROR(check_regular_file(path));
   std::error_code ec;
   const std::uintmax_t size = std::filesystem::file_size(path, ec);
   std::ifstream file(path, std::ios::binary);

@@ -17,6 +17,7 @@
 #include <unistd.h>
 
 #include "base/file.h"
+#include "base/kind_of_file.h"
 #include "base/result.h"
 #include "cli/commands.h"
 #include "cli/result_files.h"
@@ -86,7 +87,8 @@ struct ViewArguments {
 /// The volumes that a result has; none of a page, and of what is only a report.
 Result<std::vector<ResultVolume>> volumes_to_view(const fs::path& result) {
   std::error_code ec;
-  if (fs::is_regular_file(result, ec) && result.extension() != ".vdb") return std::vector<ResultVolume>();
+  if (fs::is_regular_file(result, ec) && lower_extension(result) != ".vdb")
+    return std::vector<ResultVolume>();
   Result<std::vector<ResultVolume>> volumes = volumes_of(result);
   if (!volumes.ok() && page_of(result).ok()) return std::vector<ResultVolume>();
   return volumes;

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <bit>
 #include <functional>
+#include <iterator>
 #include <memory>
 #include <span>
 #include <system_error>
@@ -161,11 +162,7 @@ Result<ImportFolder> ImportFolder::open(const fs::path& session, const std::vect
   if (name.filename().empty()) name = name.parent_path();
   fs::path work = name;
   work += ".importing";
-  fs::create_directories(work, ec);
-  if (ec) {
-    return Error{ErrorKind::io, "cannot create the folder: " + ec.message(), work.string(),
-                 "Check that its parent is writable"};
-  }
+  EMBERLOCK_ASSIGN_OR_RETURN(MadeFolders made, MadeFolders::create(work));
   EMBERLOCK_RETURN_IF_ERROR(check_work(work));
   UniqueFd lock(::open(lock_of(work).c_str(), O_RDWR | O_CREAT | O_NOFOLLOW | O_CLOEXEC, 0644));
   if (!lock) return session::errno_error(lock_of(work), "cannot create");
@@ -175,7 +172,14 @@ Result<ImportFolder> ImportFolder::open(const fs::path& session, const std::vect
   }
   if (fs::file_size(lock_of(work), ec) == 0)
     EMBERLOCK_RETURN_IF_ERROR(session::write_fully(lock.get(), kWorkText, lock_of(work)));
-  return ImportFolder(std::move(name), std::move(work), std::move(lock));
+  return ImportFolder(std::move(name), std::move(work), std::move(made), std::move(lock));
+}
+
+ImportFolder::~ImportFolder() {
+  std::error_code ec;
+  if (!lock_ || std::distance(fs::directory_iterator(work_, ec), {}) != 1) return;
+  fs::remove(lock_of(work_), ec);
+  fs::remove(work_, ec);
 }
 
 fs::path ImportFolder::part_folder(const CameraPart& part) const {

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "base/frame.h"
+#include "base/output_folder.h"
 #include "base/progress.h"
 #include "base/result.h"
 #include "base/unique_fd.h"
@@ -32,9 +33,12 @@ struct CameraPart {
 
 /// Builds a session in a folder beside the final one, "NAME.importing", one camera at a time. A camera is
 /// kept once all its frames are written. An interrupted import continues with the missing cameras, as long as
-/// originals and options are the same.
+/// originals and options are the same. An import that ends before it writes anything leaves no folder.
 class ImportFolder {
  public:
+  ImportFolder(ImportFolder&&) noexcept = default;
+  ImportFolder& operator=(ImportFolder&&) = delete;
+  ~ImportFolder();
   /// `inputs` are the files that are read; they must not lie in the session. Errors: bad_input (the session
   /// exists, an input lies in the way, "NAME.importing" isn't an import's), refused (another import is
   /// running there), io.
@@ -54,11 +58,15 @@ class ImportFolder {
                               const v1::ShutterTimes* times, const ImportReports& reports) const;
 
  private:
-  ImportFolder(std::filesystem::path session, std::filesystem::path work, UniqueFd lock)
-      : session_(std::move(session)), work_(std::move(work)), lock_(std::move(lock)) {}
+  ImportFolder(std::filesystem::path session, std::filesystem::path work, MadeFolders made, UniqueFd lock)
+      : made_(std::move(made)),
+        session_(std::move(session)),
+        work_(std::move(work)),
+        lock_(std::move(lock)) {}
   [[nodiscard]] std::filesystem::path part_folder(const CameraPart& part) const;
   [[nodiscard]] std::filesystem::path mark_of(const CameraPart& part) const;
 
+  MadeFolders made_;
   std::filesystem::path session_;
   std::filesystem::path work_;
   UniqueFd lock_;

@@ -12,6 +12,7 @@
 #include <fmt/format.h>
 
 #include "base/in_parallel.h"
+#include "base/kind_of_file.h"
 #include "films/import_parts.h"
 #include "films/small_picture.h"
 #include "recon/calibrate/rig.h"
@@ -127,7 +128,8 @@ Status check_importable(const recon::Transforms& scene) {
 
 std::optional<fs::path> transforms_in(const fs::path& path) {
   std::error_code ec;
-  if (fs::is_regular_file(path, ec)) return path.extension() == ".json" ? std::optional(path) : std::nullopt;
+  if (fs::is_regular_file(path, ec))
+    return lower_extension(path) == ".json" ? std::optional(path) : std::nullopt;
   const fs::path inside = path / "transforms.json";
   return fs::is_regular_file(inside, ec) ? std::optional(inside) : std::nullopt;
 }

@@ -14,6 +14,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include "base/kind_of_file.h"
 #include "base/log.h"
 #include "session/files.h"
 
@@ -94,12 +95,12 @@ void quiet_libav() {
 }
 
 Result<std::unique_ptr<AvFile>> AvFile::open(const std::filesystem::path& path, Mode mode) {
-  const int flags = mode == Mode::read ? O_RDONLY : O_RDWR | O_CREAT | O_TRUNC;
-  UniqueFd fd(::open(path.c_str(), flags | O_CLOEXEC, 0644));
-  if (!fd) {
-    if (mode == Mode::create) return errno_error(path, "cannot create");
-    return Error{ErrorKind::bad_input, "cannot open: " + std::generic_category().message(errno),
-                 path.string(), "Check the path and its permissions"};
+  UniqueFd fd;
+  if (mode == Mode::read) {
+    EMBERLOCK_ASSIGN_OR_RETURN(fd, open_regular_file(path));
+  } else {
+    fd = UniqueFd(::open(path.c_str(), O_RDWR | O_CREAT | O_TRUNC | O_CLOEXEC, 0644));
+    if (!fd) return errno_error(path, "cannot create");
   }
   auto* buffer = static_cast<std::uint8_t*>(av_malloc(kIoBuffer));
   std::unique_ptr<AvFile> file(new AvFile(std::move(fd), path));

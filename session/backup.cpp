@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cstdio>
 #include <iterator>
+#include <set>
 #include <string>
 #include <string_view>
 #include <system_error>
@@ -113,6 +114,18 @@ Status expect_may_replace(const fs::path& from, const FolderFiles& wanted, const
                "that is this one"};
 }
 
+/// A file that is the session's own, by a mount of its folder or a hard link, is no copy. Error (refused):
+/// the first.
+Status expect_apart(const FolderFiles& session, const FolderFiles& there, const fs::path& copy) {
+  std::set<std::pair<std::uint64_t, std::uint64_t>> own;
+  for (const auto& [path, facts] : session.files) own.insert(facts.device_and_inode);
+  for (const auto& [path, facts] : there.files)
+    if (own.contains(facts.device_and_inode))
+      return Error{ErrorKind::refused, "is the session's own file, by a mount or a hard link, and no copy",
+                   (copy / path).string(), "Unmount it, or name another folder of copies"};
+  return {};
+}
+
 /// All of it is on the disk, whoever copied it there.
 Status sync_files(const fs::path& folder) {
   EMBERLOCK_ASSIGN_OR_RETURN(const FolderFiles files, files_in(folder));
@@ -130,6 +143,7 @@ Status sync_files(const fs::path& folder) {
 Status compare_copy(const fs::path& folder, const fs::path& copy, Compare compare, const Observer& observer) {
   EMBERLOCK_ASSIGN_OR_RETURN(const FolderFiles wanted, files_in(folder));
   EMBERLOCK_ASSIGN_OR_RETURN(const FolderFiles there, files_in(copy));
+  EMBERLOCK_RETURN_IF_ERROR(expect_apart(wanted, there, copy));
   for (const auto& [path, facts] : there.files)
     if (!wanted.files.contains(path))
       return Error{ErrorKind::bad_input, "isn't in " + folder.string(), (copy / path).string()};

@@ -37,7 +37,8 @@ enum class Compare {
 Result<Backup> back_up_session(const std::filesystem::path& folder, const std::filesystem::path& backups,
                                Compare compare, const Observer& observer = {});
 
-/// Whether `copy` holds the session's files, no more and no less. Error (bad_input): the first difference.
+/// Whether `copy` holds the session's files, no more and no less. Errors: bad_input (the first difference);
+/// refused (a file of the copy is the session's own, by a mount or a hard link).
 Status compare_copy(const std::filesystem::path& folder, const std::filesystem::path& copy, Compare compare,
                     const Observer& observer = {});
 

@@ -11,6 +11,7 @@
 #include <unistd.h>
 
 #include "base/file.h"
+#include "base/kind_of_file.h"
 #include "base/unique_fd.h"
 #include "session/files.h"
 
@@ -50,8 +51,7 @@ namespace {
 Result<std::string> read_part(const fs::path& path, std::uint64_t first, std::uint64_t end) {
   if (end > kMaxIndexBytes / kIndexRecordBytes)
     return Error{ErrorKind::bad_input, "no recording has " + std::to_string(end) + " frames", path.string()};
-  const UniqueFd file(::open(path.c_str(), O_RDONLY | O_CLOEXEC));
-  if (!file) return errno_error(path, "cannot open");
+  EMBERLOCK_ASSIGN_OR_RETURN(const UniqueFd file, open_regular_file(path));
   struct stat info {};
   if (::fstat(file.get(), &info) != 0) return errno_error(path, "cannot stat");
   const std::uint64_t from = kIndexHeaderBytes + first * kIndexRecordBytes;

@@ -99,10 +99,10 @@ Result<std::vector<std::string>> files_below(const fs::path& folder) {
     if (it->is_symlink(ec))
       return Error{ErrorKind::refused, "is a link: what it leads to may change", it->path().string(),
                    "Put the file itself there"};
-    if (it->is_directory(ec) || name == kCertificate) continue;
+    if (it->is_directory(ec)) continue;
     if (!it->is_regular_file(ec))
       return Error{ErrorKind::refused, "is neither a file nor a folder", it->path().string(), "Move it away"};
-    names.push_back(name);
+    if (name != kCertificate) names.push_back(name);
   }
   if (ec) return Error{ErrorKind::io, "can't be listed: " + ec.message(), folder.string()};
   std::sort(names.begin(), names.end());

@@ -12,6 +12,7 @@
 #include <sys/file.h>
 #include <unistd.h>
 
+#include "base/kind_of_file.h"
 #include "session/files.h"
 
 namespace emberlock::session {
@@ -44,7 +45,9 @@ Result<UniqueFd> hold_finished(const std::filesystem::path& folder, Alone alone)
   // NFS locks for one alone only what is open for writing.
   const int access = alone == Alone::yes ? O_RDWR : O_RDONLY;
   const int operation = alone == Alone::yes ? LOCK_EX : LOCK_SH;
-  UniqueFd events(::open(events_path(folder).c_str(), access | O_CLOEXEC));
+  if (std::error_code ec; std::filesystem::exists(events_path(folder), ec))
+    EMBERLOCK_RETURN_IF_ERROR(check_regular_file(events_path(folder)));
+  UniqueFd events(::open(events_path(folder).c_str(), access | O_CLOEXEC | O_NONBLOCK));
   if (!events && errno != ENOENT) return errno_error(events_path(folder), "cannot open");
   const bool writing = events && ::flock(events.get(), operation | LOCK_NB) != 0;
   if (writing && errno != EWOULDBLOCK) return errno_error(events_path(folder), "cannot lock");
@@ -58,7 +61,8 @@ Result<UniqueFd> hold_finished(const std::filesystem::path& folder, Alone alone)
 }
 
 Result<EventLog> EventLog::open(const std::filesystem::path& path, Mode mode) {
-  const int flags = O_WRONLY | O_APPEND | O_CREAT | O_CLOEXEC | (mode == Mode::create ? O_EXCL : 0);
+  const int flags =
+      O_WRONLY | O_APPEND | O_CREAT | O_CLOEXEC | O_NONBLOCK | (mode == Mode::create ? O_EXCL : 0);
   UniqueFd fd(::open(path.c_str(), flags, 0644));
   if (!fd) return errno_error(path, "cannot open for writing");
   if (::flock(fd.get(), LOCK_EX | LOCK_NB) != 0) {

@@ -59,7 +59,8 @@ Result<FolderFiles> files_in(const fs::path& folder) {
     if (S_ISDIR(info.st_mode)) {
       found.folders.push_back(within);
     } else if (S_ISREG(info.st_mode)) {
-      found.files[within.string()] = {static_cast<std::uint64_t>(info.st_size), info.st_mtim};
+      found.files[within.string()] = {
+          static_cast<std::uint64_t>(info.st_size), info.st_mtim, {info.st_dev, info.st_ino}};
     } else {
       return Error{ErrorKind::bad_input, "is neither a file nor a folder, and a session holds only those",
                    at->path().string(), "Move it away; of a link, put in its place what it leads to"};
@@ -75,7 +76,7 @@ bool times_agree(const FileFacts& file, const FileFacts& copy) {
 }
 
 Result<UniqueFd> open_to_read(const fs::path& path) {
-  UniqueFd fd(::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NOFOLLOW));
+  UniqueFd fd(::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK));
   if (!fd) return errno_error(path, "cannot open");
   return fd;
 }

@@ -7,6 +7,7 @@
 #include <map>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "base/progress.h"
@@ -19,6 +20,7 @@ namespace emberlock::session {
 struct FileFacts {
   std::uint64_t bytes = 0;
   timespec modified{};
+  std::pair<std::uint64_t, std::uint64_t> device_and_inode{};  ///< equal: the same file
 };
 
 /// All files of a folder, such as a session's or its copy's, by their path within it.

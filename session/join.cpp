@@ -22,6 +22,7 @@
 #include "session/join_events.h"
 #include "session/reader.h"
 #include "session/shutter_times.h"
+#include "session/verify.h"
 
 namespace emberlock::session {
 namespace fs = std::filesystem;
@@ -54,6 +55,8 @@ struct JoinPlan {
   std::vector<PlacedPart> parts;
   std::vector<v1::HostPart> missing;
 };
+
+constexpr double kCopied = 0.5;  // share of the time: the rest reads every frame
 
 Error wrong_part(const fs::path& folder, std::string what, std::string remedy) {
   return {ErrorKind::bad_input, std::move(what), folder.string(), std::move(remedy)};
@@ -260,6 +263,22 @@ Status write_joined(const fs::path& folder, const v1::Manifest& manifest,
   return {};
 }
 
+/// A part may have been damaged since it was recorded: the first of its faults, by its own folder.
+Status expect_whole(const fs::path& joined, const JoinPlan& plan, const Observer& observer) {
+  EMBERLOCK_ASSIGN_OR_RETURN(const SessionCheck check, verify_session(joined, observer));
+  if (check.readable) return {};
+  const auto damaged = [](const fs::path& part, const std::string& what) {
+    return Error{ErrorKind::refused, what, part.string(),
+                 "Restore it from a copy, or let `emberlock sessions repair` keep what is good of it"};
+  };
+  for (const CameraCheck& camera : check.cameras)
+    for (const PlacedPart& placed : plan.parts)
+      if (!camera.problems.empty() && placed.part->camera_ids().contains(camera.camera_id))
+        return damaged(placed.part->folder, camera.problems.front());
+  return damaged(plan.parts.front().part->folder,
+                 check.problems.empty() ? "the joined session isn't whole" : check.problems.front());
+}
+
 }  // namespace
 
 Result<Joined> join_sessions(const std::vector<fs::path>& parts, const fs::path& out, Missing missing,
@@ -277,8 +296,9 @@ Result<Joined> join_sessions(const std::vector<fs::path>& parts, const fs::path&
   EMBERLOCK_RETURN_IF_ERROR(check_apart(out, parts));
   EMBERLOCK_RETURN_IF_ERROR(check_new_folder(out));
   EMBERLOCK_ASSIGN_OR_RETURN(OutputFolder folder, OutputFolder::create({out, kJoin, parts}));
-  EMBERLOCK_RETURN_IF_ERROR(copy_cameras(plan, folder.path(), observer));
+  EMBERLOCK_RETURN_IF_ERROR(copy_cameras(plan, folder.path(), part_of(observer, 0, kCopied)));
   EMBERLOCK_RETURN_IF_ERROR(write_joined(folder.path(), joined.manifest, events.events, times));
+  EMBERLOCK_RETURN_IF_ERROR(expect_whole(folder.path(), plan, part_of(observer, kCopied, kNearlyDone)));
   EMBERLOCK_RETURN_IF_ERROR(folder.commit());
   // A session is nobody's earlier result: no verb may replace it.
   std::error_code ec;

@@ -37,7 +37,7 @@ struct Joined {
 /// several sessions or purposes; not exactly one that leads; one that wasn't recorded for another host, or
 /// that the leader doesn't name; other cameras than it names, or one twice; no or a wild reading of a host's
 /// clock; a missing part; times.json in some parts alone; the target is in the way), refused (a part isn't
-/// finished, or another process writes it; cancelled by the observer), io.
+/// finished, is damaged, or another process writes it; cancelled by the observer), io.
 Result<Joined> join_sessions(const std::vector<std::filesystem::path>& parts,
                              const std::filesystem::path& out, Missing missing,
                              const Observer& observer = {});

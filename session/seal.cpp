@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "base/hex.h"
+#include "base/kind_of_file.h"
 #include "base/sha256.h"
 
 namespace emberlock::session {
@@ -32,6 +33,7 @@ Error no_seal(std::string what, const std::string& where) {
 }
 
 Result<std::string> seal_text_at(const fs::path& path, std::uint64_t offset) {
+  EMBERLOCK_RETURN_IF_ERROR(check_regular_file(path));
   std::ifstream file(path, std::ios::binary);
   if (!file) return Error{ErrorKind::io, "can't be read", path.string()};
   std::string text(kSealLength, '\0');

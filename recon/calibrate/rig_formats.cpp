@@ -10,6 +10,7 @@
 #include <nlohmann/json.hpp>
 
 #include "base/file.h"
+#include "base/kind_of_file.h"
 #include "recon/calibrate/pose.h"
 #include "recon/calibrate/transforms.h"
 

@@ -5,6 +5,7 @@
 #include <system_error>
 #include <utility>
 
+#include "base/kind_of_file.h"
 #include "recon/export/vdb_header.h"
 
 namespace emberlock::recon {
@@ -18,6 +19,7 @@ struct CertificateText {
 
 /// Nothing where the file has none.
 Result<std::optional<CertificateText>> certificate_in(const fs::path& vdb) {
+  EMBERLOCK_RETURN_IF_ERROR(check_regular_file(vdb));
   std::ifstream file(vdb, std::ios::binary);
   if (!file)
     return Error{ErrorKind::io, "can't be read", vdb.string(), "Check that the file is there and readable"};
@@ -40,6 +42,13 @@ Status seal_volume(const fs::path& vdb, const SigningKey* key) {
   EMBERLOCK_ASSIGN_OR_RETURN(const std::optional<CertificateText> found, certificate_in(vdb));
   if (!found) return Error{ErrorKind::bad_input, "has no certificate to seal", vdb.string()};
   return session::seal_file(vdb, found->seal_offset, key, session::kSealsVolume);
+}
+
+Result<bool> check_seal_of_volume(const fs::path& vdb) {
+  EMBERLOCK_ASSIGN_OR_RETURN(const std::optional<CertificateText> found, certificate_in(vdb));
+  if (!found) return false;
+  EMBERLOCK_RETURN_IF_ERROR(session::check_seal(vdb, found->seal_offset, session::kSealsVolume));
+  return true;
 }
 
 Result<std::optional<CertifiedVolume>> check_volume(const fs::path& vdb, const Observer& observer) {

@@ -34,10 +34,13 @@ struct CertifiedVolume {
   session::Seal seal;
   std::uint64_t bytes = 0;
 };
+/// Whether a volume is sealed. Error (refused): a byte isn't as it was sealed. Errors: as check_volume().
+Result<bool> check_seal_of_volume(const std::filesystem::path& vdb);
+
 /// A volume's certificate, if it holds: each byte of the file is as it was sealed. Error (refused): it
 /// doesn't hold. Errors (bad_input): no OpenVDB file; a certificate that is cut off, there twice, or of
 /// another version.
-/// Nothing of a volume without one, as Emberlock 0.1 wrote it.
+/// Nothing of a volume without one, as versions before 0.2.0 wrote it.
 Result<std::optional<CertifiedVolume>> check_volume(const std::filesystem::path& vdb,
                                                     const Observer& observer = {});
 

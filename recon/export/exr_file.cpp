@@ -10,6 +10,8 @@
 #include <OpenEXR/ImfInputFile.h>
 #include <OpenEXR/ImfOutputFile.h>
 
+#include "base/kind_of_file.h"
+
 namespace emberlock::recon {
 namespace {
 
@@ -51,6 +53,7 @@ Status write_exr(ImageSize size, const std::vector<ExrChannel>& channels,
 }
 
 Result<ExrValues> read_exr(const std::filesystem::path& path, const std::vector<std::string>& names) try {
+  EMBERLOCK_RETURN_IF_ERROR(check_regular_file(path));
   Imf::InputFile file(path.c_str());
   const Imath::Box2i& window = file.header().dataWindow();
   ExrValues picture;

@@ -11,8 +11,6 @@
 namespace emberlock::recon {
 namespace {
 
-constexpr std::uint64_t kMagic = 0x56444220;                   // " BDV", as 64 bits
-constexpr std::uint64_t kFirstMetadatum = 8 + 3 * 4 + 1 + 36;  // behind magic, versions, offsets, identifier
 constexpr std::uint32_t kLongestName = 1024;
 constexpr std::uint32_t kLongestText = std::uint32_t{64} << 20;
 constexpr std::uint32_t kMostMetadata = 4096;
@@ -78,8 +76,10 @@ Error bad_header(std::string what, const std::string& where) {
 Result<std::optional<VdbText>> find_vdb_text(std::istream& file, std::string_view key,
                                              const std::string& where) {
   HeaderReader header(file);
-  if (header.number<std::uint64_t>() != kMagic) return bad_header("isn't an OpenVDB file", where);
-  header.go_to(kFirstMetadatum);
+  std::array<char, kVdbMagic.size()> magic{};
+  std::copy(kVdbMagic.begin(), kVdbMagic.end(), magic.begin());
+  if (header.number<std::array<char, 8>>() != magic) return bad_header("isn't an OpenVDB file", where);
+  header.go_to(kVdbFirstMetadatum);
   const auto count = header.number<std::uint32_t>();
   if (!count) return bad_header("is cut short in its header", where);
   if (*count > kMostMetadata) return bad_header("has a damaged header", where);

@@ -11,6 +11,10 @@
 
 namespace emberlock::recon {
 
+inline constexpr std::string_view kVdbMagic{" BDV\0\0\0\0", 8};
+/// Behind magic, versions, whether there are offsets, and the identifier.
+inline constexpr std::uint64_t kVdbFirstMetadatum = 8 + 3 * 4 + 1 + 36;
+
 /// A text of a file's metadata, and where its first byte stands.
 struct VdbText {
   std::uint64_t offset = 0;

@@ -41,25 +41,43 @@ class ContentHash {
   std::uint64_t first_ = 1, second_ = 2;
 };
 
+/// The identifier that follows from what is behind it. Throws std::ios::failure.
+std::string identifier_of(std::istream& file) {
+  file.seekg(0, std::ios::end);
+  std::streamoff left = static_cast<std::streamoff>(file.tellg()) - std::streamoff{kBefore + kIdentifier};
+  file.seekg(kBefore + kIdentifier);
+  ContentHash hash;
+  std::vector<char> block(1 << 20);
+  while (left > 0) {
+    const auto count = std::min(left, static_cast<std::streamoff>(block.size()));
+    file.read(block.data(), count);
+    hash.add({block.data(), static_cast<std::size_t>(count)});
+    left -= count;
+  }
+  return hash.as_uuid();
+}
+
 }  // namespace
 
 void identify_by_content(const std::filesystem::path& vdb) {
   std::fstream file(vdb, std::ios::binary | std::ios::in | std::ios::out);
   file.exceptions(std::ios::failbit | std::ios::badbit);
-  file.seekg(0, std::ios::end);
-  std::size_t left = static_cast<std::size_t>(file.tellg()) - kBefore - kIdentifier;
-  file.seekg(kBefore + kIdentifier);
-  ContentHash hash;
-  std::vector<char> block(1 << 20);
-  while (left > 0) {
-    const std::size_t count = std::min(left, block.size());
-    file.read(block.data(), static_cast<std::streamsize>(count));
-    hash.add({block.data(), count});
-    left -= count;
-  }
+  const std::string identifier = identifier_of(file);
   file.seekp(kBefore);
-  file << hash.as_uuid();
+  file << identifier;
   file.close();
+}
+
+bool is_identified_by_content(const std::filesystem::path& vdb) try {
+  std::ifstream file(vdb, std::ios::binary);
+  file.exceptions(std::ios::failbit | std::ios::badbit);
+  const std::string expected = identifier_of(file);
+  std::string there(kIdentifier, '\0');
+  file.seekg(kBefore);
+  file.read(there.data(), static_cast<std::streamsize>(there.size()));
+  return there == expected;
+} catch (const std::ios::failure&) {
+  return false;
 }
 
 }  // namespace emberlock::recon

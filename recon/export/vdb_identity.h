@@ -10,4 +10,7 @@ namespace emberlock::recon {
 /// so that equal volumes are equal files. Throws std::ios::failure.
 void identify_by_content(const std::filesystem::path& vdb);
 
+/// Whether a file has the identifier that follows from the rest of it, as one has that wasn't sealed later.
+bool is_identified_by_content(const std::filesystem::path& vdb);
+
 }  // namespace emberlock::recon

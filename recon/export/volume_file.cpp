@@ -20,6 +20,7 @@
 
 #include "recon/export/medium_grid.h"
 #include "recon/export/vdb_identity.h"
+#include "recon/export/volume_kind.h"
 
 namespace emberlock::recon {
 namespace {
@@ -95,27 +96,13 @@ Result<Grid> geometry(const openvdb::GridBase& from, const std::filesystem::path
   return grid;
 }
 
-/// A marker at the end of the file, which OpenVDB's readers don't read (they use offsets). For a truncated
-/// file they would take any bytes for sizes, and allocate that much memory.
-constexpr std::string_view kEnd = "emberlock: end of volume";
-/// Of a file whose values lie elsewhere than OpenVDB says: read_volume() doesn't take it for a volume.
-constexpr std::string_view kEndLater = "emberlock: end of volume, half an edge back";
-
-bool is_whole(const std::filesystem::path& path) {
-  std::ifstream file(path, std::ios::binary);
-  std::string end(kEnd.size(), '\0');
-  file.seekg(-static_cast<std::streamoff>(kEnd.size()), std::ios::end);
-  file.read(end.data(), static_cast<std::streamsize>(end.size()));
-  return file.good() && end == kEnd;
-}
-
 bool inside(const Grid& grid, const openvdb::Coord& c) {
   return c.x() >= 0 && c.y() >= 0 && c.z() >= 0 && c.x() < grid.nx && c.y() < grid.ny && c.z() < grid.nz;
 }
 
-/// An opened file that is whole.
+/// An opened file that is as it was written.
 Result<std::unique_ptr<openvdb::io::File>> opened(const std::filesystem::path& path) {
-  if (!is_whole(path)) return damaged(path, "is cut short, or Emberlock hasn't written it");
+  EMBERLOCK_RETURN_IF_ERROR(check_volume_file(path));
   openvdb::initialize();
   auto file = std::make_unique<openvdb::io::File>(path.string());
   file->open();
@@ -178,6 +165,13 @@ Result<std::vector<float>> all_values(const openvdb::GridBase::Ptr& base, const 
   EMBERLOCK_RETURN_IF_ERROR(scalar ? take_values(*scalar, grid, name, path, put_one)
                                    : take_values(*vector, grid, name, path, put_three));
   return values;
+}
+
+Result<std::vector<float>> values_in(openvdb::io::File& file, const std::string& name,
+                                     const std::filesystem::path& path) {
+  const openvdb::GridBase::Ptr base = file.readGrid(name);
+  EMBERLOCK_ASSIGN_OR_RETURN(const Grid grid, geometry(*base, path));
+  return all_values(base, grid, path);
 }
 
 /// Makes two corners around a grid's active box active too. Where Blender before 5.0 is built without
@@ -311,7 +305,7 @@ Status write_volume(const Volume& volume, const std::filesystem::path& path,
   for (const NamedGrid& grid : further)
     grids.push_back(grid_of(volume.grid, grid.name, grid.unit, grid.values));
   if (!volume.inside.empty()) grids.push_back(grid_of(volume.grid, kMedium, "1", medium_values(volume)));
-  return write_file(grids, metadata_of(lighting), path, kEnd, certification);
+  return write_file(grids, metadata_of(lighting), path, kEndOfVolume, certification);
 }
 
 Result<Volume> read_volume(const std::filesystem::path& path) try {
@@ -360,9 +354,7 @@ Result<Lighting> read_lighting(const std::filesystem::path& path) try {
 Result<std::vector<float>> read_grid(const std::filesystem::path& path, const std::string& name) try {
   EMBERLOCK_ASSIGN_OR_RETURN(const auto file, opened(path));
   if (!file->hasGrid(name)) return damaged(path, "has no grid " + name);
-  const openvdb::GridBase::Ptr base = file->readGrid(name);
-  EMBERLOCK_ASSIGN_OR_RETURN(const Grid grid, geometry(*base, path));
-  return all_values(base, grid, path);
+  return values_in(*file, name, path);
 } catch (const std::exception& e) {
   return damaged(path, e.what());
 }
@@ -371,7 +363,7 @@ Result<std::optional<std::vector<float>>> read_values(const std::filesystem::pat
                                                       const std::string& name, const Grid& grid) try {
   EMBERLOCK_ASSIGN_OR_RETURN(const auto file, opened(path));
   if (!file->hasGrid(name)) return std::optional<std::vector<float>>();
-  EMBERLOCK_ASSIGN_OR_RETURN(std::vector<float> values, read_grid(path, name));
+  EMBERLOCK_ASSIGN_OR_RETURN(std::vector<float> values, values_in(*file, name, path));
   if (values.size() != grid.size()) return damaged(path, name + " is of another size than emission");
   return std::optional(std::move(values));
 } catch (const std::exception& e) {
@@ -419,7 +411,7 @@ Status write_vdb(const SharedVolume& volume, const std::filesystem::path& path, 
   };
   for (const SharedGrid& from : volume.grids) add(from);
   if (volume.find("density") == nullptr) add({"density", "1/m", "", std::vector<float>(volume.grid.size())});
-  return write_file(grids, about, path, later ? kEndLater : kEnd, volume.certification);
+  return write_file(grids, about, path, later ? kEndOfLaterVolume : kEndOfVolume, volume.certification);
 }
 
 }  // namespace emberlock::recon

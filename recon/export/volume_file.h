@@ -41,7 +41,8 @@ Status write_volume(const Volume& volume, const std::filesystem::path& path,
                     const Certification& certification = {});
 
 /// Reads a file of write_volume(), bit-identically; a density without active points becomes an empty
-/// extinction. Errors: not an OpenVDB file; missing grids or metadata.
+/// extinction. Errors (bad_input): not such a file, or one whose bytes were changed since (volume_kind.h);
+/// missing grids or metadata.
 Result<Volume> read_volume(const std::filesystem::path& path);
 
 /// What a file's medium scatters; nothing in files that don't tell. Errors: not an OpenVDB file; metadata of

@@ -8,10 +8,8 @@
 #include <system_error>
 #include <utility>
 
-#include <fcntl.h>
-#include <sys/stat.h>
-
 #include "base/file.h"
+#include "base/kind_of_file.h"
 #include "base/unique_fd.h"
 #include "session/layout.h"
 #include "session/media/frame_decoders.h"
@@ -86,15 +84,7 @@ class StillFile final : public FrameFile {
 };
 
 Result<std::string> read_head(const std::filesystem::path& path) {
-  const UniqueFd fd(::open(path.c_str(), O_RDONLY | O_CLOEXEC));
-  if (!fd) {
-    return Error{ErrorKind::bad_input, "cannot open: " + std::generic_category().message(errno),
-                 path.string(), "Check the path and its permissions"};
-  }
-  struct stat info {};
-  if (::fstat(fd.get(), &info) != 0 || !S_ISREG(info.st_mode)) {
-    return Error{ErrorKind::bad_input, "not a regular file", path.string(), "Name an image or a video file"};
-  }
+  EMBERLOCK_ASSIGN_OR_RETURN(const UniqueFd fd, open_regular_file(path));
   std::array<char, 32> head{};
   const ssize_t n = ::read(fd.get(), head.data(), head.size());
   if (n < 0) {

@@ -2,6 +2,7 @@
 #include "base/output_folder.h"
 
 #include <array>
+#include <chrono>
 #include <fstream>
 #include <map>
 
@@ -94,6 +95,40 @@ TEST_F(OutputFolderTest, AppearsWhenItIsCommittedAndNotBefore) {
   ASSERT_TRUE(folder->commit().ok());
   EXPECT_EQ(files_in(out_), (Files{{"report.json", "first"}}));
   EXPECT_EQ(beside(), 1U);
+}
+
+/// A copy has other times: files are compared by what they hold.
+TEST_F(OutputFolderTest, ACopyIsAnEarlierResultAsTheOriginalIs) {
+  make_first();
+  for (const auto& [name, text] : kFirst) {
+    const fs::path file = out_ / name;
+    fs::last_write_time(file, fs::last_write_time(file) + std::chrono::hours(1));
+    EXPECT_TRUE(OutputFolder::check(request()).ok()) << name;
+  }
+  for (const auto& [name, text] : kFirst) {
+    std::string other = text;
+    other.back() = 'z';
+    write(out_ / name, other);
+    expect_refused(request(), name + ": was changed since Emberlock made it");
+    write(out_ / name, text);
+  }
+  const Status made = make(request(), kSecond);
+  ASSERT_TRUE(made.ok()) << made.error().message();
+  EXPECT_EQ(files_in(out_), kSecond);
+}
+
+/// As earlier versions wrote it.
+TEST_F(OutputFolderTest, AListWithoutHashesComparesTimes) {
+  make_first();
+  std::string list = *read_file(out_ / kResultList);
+  for (std::size_t at = list.find(",\n   \"sha256\""); at != std::string::npos;
+       at = list.find(",\n   \"sha256\""))
+    list.erase(at, list.find('\n', at + 2) - at);
+  ASSERT_EQ(list.find("sha256"), std::string::npos);
+  write(out_ / kResultList, list);
+  EXPECT_TRUE(OutputFolder::check(request()).ok());
+  fs::last_write_time(out_ / "report.json", fs::file_time_type::clock::now() + std::chrono::hours(1));
+  expect_refused(request(), "has another size or time than in the list");
 }
 
 TEST_F(OutputFolderTest, AbandonedItLeavesNothing) {

@@ -38,5 +38,12 @@ TEST(Result, TheAbsentValueIsALogicError) {
   EXPECT_THROW((void)half(2).error(), std::bad_variant_access);
 }
 
+TEST(Result, AMessageOfAForeignTextHasABound) {
+  const std::string huge(100'000'000, 'x');
+  const Error error{ErrorKind::bad_input, huge, huge, "Do this"};
+  EXPECT_LT(error.message().size(), 5000U);
+  EXPECT_TRUE(error.message().ends_with("x.... Do this"));
+}
+
 }  // namespace
 }  // namespace emberlock

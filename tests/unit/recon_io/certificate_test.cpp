@@ -12,6 +12,7 @@
 #include "base/random.h"
 #include "base/sha256.h"
 #include "recon/export/vdb_header.h"
+#include "recon/export/vdb_identity.h"
 #include "recon/export/volume_file.h"
 #include "recon/pipeline/certify.h"
 #include "tests/support/recording.h"
@@ -166,6 +167,8 @@ TEST_F(VolumeCertificateTest, AVolumeWithoutOneIsReadAsBefore) {
   std::string bytes = bytes_of(path);
   bytes.replace(bytes.find(kCertificateKey), 20, "emberlock_something_");  // as if no certificate were there
   put_bytes(path, bytes);
+  EXPECT_THAT(read_volume(path), FailsWith("carries no certificate"));
+  identify_by_content(path);  // as those volumes are
   EXPECT_EQ(checked(path), "none");
   const auto volume = value_of(read_volume(path));
   EXPECT_EQ(volume.emission, a_flame().emission);

@@ -276,5 +276,38 @@ TEST(SessionRemoval, OneThatWasKilledIsFinishedByTheNext) {
   EXPECT_TRUE(verify_session(store.session)->whole());
 }
 
+/// As a mount of the session's folder within the copy has them: removing the session would remove both.
+TEST(SessionBackup, AFileThatIsTheSessionsOwnIsNoCopy) {
+  Store store;
+  store.back_up_well(Backup::Outcome::copied);
+  const std::vector<fs::path> files = store.files(store.session);
+  for (const fs::path& own : files) {
+    const fs::path copied = store.copy / own.lexically_relative(store.session);
+    for (const fs::path& there : {copied, store.copy / "another name"}) {
+      const std::string bytes = bytes_of(copied);
+      fs::remove(there);
+      fs::create_hard_link(own, there);
+      const std::string words = "is the session's own file";
+      for (const Status& status : {remove_backed_up(store.session, store.backups),
+                                   compare_copy(store.session, store.copy, Compare::times),
+                                   compare_copy(store.session, store.copy, Compare::bytes), [&] {
+                                     const auto done = store.back_up();
+                                     return done ? Status() : Status(done.error());
+                                   }()}) {
+        ASSERT_FALSE(status.ok()) << own;
+        EXPECT_EQ(status.error().kind, ErrorKind::refused);
+        EXPECT_THAT(status.error().message(), HasSubstr(words));
+      }
+      EXPECT_EQ(store.files(store.session), files);
+      fs::remove(there);
+      if (there == copied) {
+        put_bytes(there, bytes);
+        fs::last_write_time(there, fs::last_write_time(own));
+      }
+    }
+  }
+  store.back_up_well(Backup::Outcome::kept);
+}
+
 }  // namespace
 }  // namespace emberlock::session

@@ -476,5 +476,28 @@ TEST_F(Join, APartsCertificateIsNotTheSessions) {
   expect_whole();
 }
 
+/// Wherever a frame of a part was damaged since, the part is named and nothing is made.
+TEST_F(Join, ADamagedPartIsRefused) {
+  record(test::three_hosts());
+  int damaged = 0;
+  for (const fs::path& part : parts_)
+    for (const auto& entry : fs::recursive_directory_iterator(part)) {
+      const std::string extension = entry.path().extension();
+      if (extension != ".nut" && extension != ".mkv") continue;
+      const std::string bytes = bytes_of(entry.path());
+      for (const double share : {0.3, 0.6, 0.9}) {
+        std::string changed = bytes;
+        changed.replace(static_cast<std::size_t>(share * static_cast<double>(bytes.size())), 8, "xxxxxxxx");
+        test::put_bytes(entry.path(), changed);
+        if (verify_session(part)->readable) continue;
+        expect_refused(ErrorKind::refused, part.string());
+        ++damaged;
+      }
+      test::put_bytes(entry.path(), bytes);
+    }
+  EXPECT_GE(damaged, 5);
+  join_well();
+}
+
 }  // namespace
 }  // namespace emberlock::session

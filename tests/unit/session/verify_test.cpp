@@ -2,12 +2,16 @@
 #include "session/verify.h"
 
 #include <string>
+#include <vector>
 
 #include <gtest/gtest.h>
+#include <sys/stat.h>
 
+#include "session/certificate.h"
 #include "session/files.h"
 #include "session/index.h"
 #include "session/salvage.h"
+#include "session/shutter_times.h"
 #include "tests/support/recording.h"
 
 namespace emberlock::session {
@@ -287,6 +291,30 @@ TEST(TranscodeThreads, CutShortAnywhereIsTakenUpAgain) {
     EXPECT_EQ(read_manifest(folder)->cameras(1).segments(2).file(), "cam1/000002.mkv");
   }
   EXPECT_GT(end_at, 20);
+}
+
+/// A pipe in a file's place ends no reader: opening one waits for a writer.
+TEST(SessionVerify, APipeInAFilesPlaceIsAFault) {
+  const TempFolder temp;
+  record_two(temp / "s");
+  ASSERT_TRUE(certify_session(temp / "s", "emberlock 1", nullptr).ok());
+  std::vector<std::filesystem::path> files{temp / "s" / "times.json"};
+  for (const auto& entry : std::filesystem::recursive_directory_iterator(temp / "s"))
+    if (entry.is_regular_file()) files.push_back(entry.path());
+  EXPECT_GE(files.size(), 10U);
+  for (const std::filesystem::path& file : files) {
+    const bool there = std::filesystem::exists(file);
+    if (there) std::filesystem::rename(file, temp / "kept");
+    ASSERT_EQ(::mkfifo(file.c_str(), 0600), 0);
+    const auto check = verify_session(temp / "s");
+    EXPECT_FALSE(check && check->whole()) << file;
+    EXPECT_FALSE(certify_session(temp / "s", "emberlock 1", nullptr).ok()) << file;
+    if (const auto session = SessionReader::open(temp / "s"); session && !there)
+      EXPECT_FALSE(read_shutter_times(*session).ok());
+    std::filesystem::remove(file);
+    if (there) std::filesystem::rename(temp / "kept", file);
+  }
+  EXPECT_TRUE(verified(temp / "s").whole());
 }
 
 }  // namespace

@@ -89,11 +89,11 @@ Result<cv::Mat> without_transparency(const cv::Mat& mat, const StillContents::Pi
   }
   if (mat.channels() != 4 || (mat.depth() != CV_8U && !wide)) return mat;
   if (still.transparency == Transparency::unnamed &&
-      !(wide ? is_opaque<std::uint16_t>(mat) : is_opaque<Byte>(mat)))
+      !(wide ? is_opaque<std::uint16_t>(mat) : is_opaque<std::uint8_t>(mat)))
     return Error{ErrorKind::bad_input, "the meaning of its fourth sample isn't stated (ExtraSamples)", where,
                  "Write it as straight or premultiplied alpha, or without it"};
   const bool multiply = still.transparency == Transparency::straight && alpha == Alpha::over_black;
-  cv::Mat out = wide ? over_black<std::uint16_t>(mat, multiply) : over_black<Byte>(mat, multiply);
+  cv::Mat out = wide ? over_black<std::uint16_t>(mat, multiply) : over_black<std::uint8_t>(mat, multiply);
   if (still.is_grey) cv::extractChannel(out, out, 0);
   return out;
 }

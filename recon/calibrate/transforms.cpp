@@ -235,7 +235,10 @@ Result<TransformsFrame> read_frame(const json& object, const Place& place, const
 /// What the parser expected instead; empty where it gives no reason.
 std::string expectation(const std::string& message) {
   const auto at = message.rfind("; expected ");
-  return at == std::string::npos ? "" : ": " + message.substr(at + 2);
+  if (at == std::string::npos) return "";
+  const std::string expected = message.substr(at + std::string_view("; expected ").size());
+  const bool closing = expected == "'}'" || expected == "']'";  // the parser doesn't mention the comma
+  return std::string(": expected ") + (closing ? "',' or " : "") + expected;
 }
 
 Result<json> parse(std::string_view foreign, const Place& place, const std::string& source) {

@@ -16,6 +16,7 @@
 #include <pugixml.hpp>
 #include <yaml-cpp/yaml.h>
 
+#include "recon/calibrate/pose.h"
 #include "recon/calibrate/rig_formats.h"
 
 namespace emberlock::recon {
@@ -393,6 +394,8 @@ Result<v1::RigCamera> opencv_camera(const OpencvFile& file, const std::string& i
       camera.camera_from_world.rotation(i / 3, i % 3) = (*turn)[static_cast<std::size_t>(i)];
     for (int i = 0; i < 3; ++i)
       camera.camera_from_world.translation[i] = (*place)[static_cast<std::size_t>(i)];
+    if (const auto rotation = nearest_rotation(camera.camera_from_world.rotation); !rotation)
+      return bad_opencv(where + ": R", rotation.error().what, rotation.error().remedy);
   }
   v1::RigCamera message = rig_camera_of(id, camera);
   if (!posed) message.mutable_calibration()->clear_camera_from_world();

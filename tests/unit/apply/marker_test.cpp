@@ -158,7 +158,7 @@ TEST(MarkerSlow, ACutMarginLeavesTheDistance) {
       }
     }
   }
-  EXPECT_GE(found, cases / 2);
+  EXPECT_GE(found, cases / 4) << "else little is tested";
 }
 
 TEST(MarkerTest, AMarkerMayBeWhiteOnBlack) {

@@ -161,7 +161,9 @@ TEST(ColmapModels, BrokenOffAnywhereAreRefused) {
         << cut;
   EXPECT_THAT(parse_colmap_binary(model.cameras_bin, model.images_bin + "x", "model"), FailsWith("longer"));
   std::string fisheye = model.cameras_bin;
-  fisheye[12] = 5;
+  constexpr std::size_t kFifthModel = 8 + 48 + 56 + 56 + 64 + 4;  // bytes before its number
+  ASSERT_EQ(fisheye[kFifthModel], 4);
+  fisheye[kFifthModel] = 5;  // which has as many parameters
   EXPECT_THAT(parse_colmap_binary(fisheye, model.images_bin, "model"),
               FailsWith("OPENCV_FISHEYE", "fisheye lens", "image_undistorter"));
 }

@@ -276,17 +276,23 @@ class PlannedRun {
     describe(point, options, choices);
     const double from = progress_from(plan_.attempts++);
     const double to = progress_from(plan_.attempts);
-    return run_once(task_, options, [&](double fraction, std::string_view words) {
-      tell(progress_, from + (to - from) * std::min(fraction, 0.999), words);
-    });
+    EMBERLOCK_ASSIGN_OR_RETURN(Outcome outcome,
+                               run_once(task_, options, [&](double fraction, std::string_view words) {
+                                 tell(progress_, from + (to - from) * std::min(fraction, 0.999), words);
+                               }));
+    rendering_a_voxel_ = outcome.report.render_time.value() / point.settings.voxels;
+    return outcome;
   }
 
-  /// Predicted seconds for rendering every view, from one view of the reference.
+  /// Predicted seconds for rendering every view, by the last run or one view of the reference. A reference
+  /// that was measured while the machine was busy must not leave the solver without time.
   [[nodiscard]] double rendering(const WorkPoint& point) const {
+    constexpr double kMostOfRest = 0.5;
     const Grid& grid = reference_.reconstruction.hull.grid;
-    const double finer = point.settings.voxels / (std::max({grid.nx, grid.ny, grid.nz}) - 1.0);
-    return kRenderReserve * reference_.seconds_to_render.value() * finer *
-           static_cast<double>(task_.scene().views.size());
+    const double views = static_cast<double>(task_.scene().views.size());
+    const double a_voxel = rendering_a_voxel_.value_or(reference_.seconds_to_render.value() * views /
+                                                       (std::max({grid.nx, grid.ny, grid.nz}) - 1.0));
+    return std::min(kRenderReserve * a_voxel * point.settings.voxels, kMostOfRest * seconds_left());
   }
 
   /// Each attempt gets half of what is left of the bar: another may follow.
@@ -362,6 +368,7 @@ class PlannedRun {
   const ReconstructOptions& asked_;
   const Progress& progress_;
   Reference reference_;
+  std::optional<double> rendering_a_voxel_;  // seconds for all views, over the voxels along the longest edge
   PlanReport plan_;
 };
 

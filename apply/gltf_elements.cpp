@@ -49,8 +49,8 @@ GltfElements::GltfElements(const tinygltf::Model& model, int accessor, int type,
   normalised_ = a.normalized;
   component_size_ = component_size_of(kind_);
   const std::size_t size =
-      component_size_ * static_cast<std::size_t>(std::max(
-                            0, tinygltf::GetNumComponentsInType(static_cast<std::uint32_t>(type))));
+      component_size_ * static_cast<std::size_t>(
+                            std::max(0, tinygltf::GetNumComponentsInType(static_cast<std::uint32_t>(type))));
   if (size == 0) refuse(name + " is of no known type", where);
   stride_ = size;
   if (a.bufferView >= 0 || !a.sparse.isSparse) {

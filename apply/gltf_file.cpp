@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstring>
 #include <map>
+#include <numeric>
 #include <optional>
 #include <set>
 
@@ -12,10 +13,13 @@
 #include <fmt/format.h>
 #include <tiny_gltf.h>
 
+#include "apply/gltf_elements.h"
 #include "apply/gltf_parts.h"
 #include "apply/unreadable.h"
 #include "base/file.h"
+#include "base/kind_of_file.h"
 #include "base/nesting.h"
+#include "session/text.h"
 
 namespace emberlock::apply {
 namespace {
@@ -68,63 +72,16 @@ Eigen::Matrix4d matrix_of(const tinygltf::Node& node, const std::string& where) 
   return m;
 }
 
-/// The elements of an accessor, wherever they lie in its buffer.
-class Elements {
- public:
-  Elements(const tinygltf::Model& model, int accessor, int type, const std::string& where) {
-    const tinygltf::Accessor& a = entry(model.accessors, accessor, "accessor");
-    if (a.sparse.isSparse) refuse("sparse accessors can't be read", where, "Export without them");
-    if (a.type != type) refuse(fmt::format("accessor {} is of another type", accessor), where);
-    const tinygltf::BufferView& view = entry(model.bufferViews, a.bufferView, "bufferView");
-    const tinygltf::Buffer& buffer = entry(model.buffers, view.buffer, "buffer");
-    const int stride = a.ByteStride(view);
-    const auto size = static_cast<std::size_t>(
-        std::max(0, tinygltf::GetComponentSizeInBytes(static_cast<std::uint32_t>(a.componentType)) *
-                        tinygltf::GetNumComponentsInType(static_cast<std::uint32_t>(type))));
-    if (stride <= 0 || size == 0 || static_cast<std::size_t>(stride) < size)
-      refuse(fmt::format("accessor {} has no step", accessor), where);
-    stride_ = static_cast<std::size_t>(stride);
-    count_ = a.count;
-    kind_ = a.componentType;
-    const std::size_t all = buffer.data.size();
-    if (view.byteOffset > all || view.byteLength > all - view.byteOffset || a.byteOffset > view.byteLength ||
-        (count_ > 0 && (count_ - 1 > (view.byteLength - a.byteOffset) / stride_ ||
-                        (count_ - 1) * stride_ + size > view.byteLength - a.byteOffset)))
-      refuse(fmt::format("accessor {} goes beyond its buffer", accessor), where, "The file is cut short");
-    data_ = buffer.data.data() + view.byteOffset + a.byteOffset;
+/// The corners of a primitive's triangles, three and three.
+std::vector<std::uint32_t> triangles_of(int mode, std::vector<std::uint32_t> corners) {
+  if (mode != TINYGLTF_MODE_TRIANGLE_STRIP && mode != TINYGLTF_MODE_TRIANGLE_FAN) {
+    corners.resize(corners.size() / 3 * 3);
+    return corners;
   }
-  [[nodiscard]] std::size_t size() const { return count_; }
-  [[nodiscard]] int kind() const { return kind_; }
-  template <class T>
-  [[nodiscard]] T at(std::size_t i) const {
-    T value;
-    std::memcpy(&value, data_ + i * stride_, sizeof value);
-    return value;
-  }
-
- private:
-  const unsigned char* data_ = nullptr;
-  std::size_t stride_ = 0, count_ = 0;
-  int kind_ = 0;
-};
-
-std::vector<std::uint32_t> indices_of(const tinygltf::Model& model, int accessor, const std::string& where) {
-  const Elements elements(model, accessor, TINYGLTF_TYPE_SCALAR, where);
-  std::vector<std::uint32_t> out(elements.size());
-  for (std::size_t i = 0; i < out.size(); ++i) {
-    switch (elements.kind()) {
-      case TINYGLTF_COMPONENT_TYPE_UNSIGNED_BYTE:
-        out[i] = elements.at<std::uint8_t>(i);
-        break;
-      case TINYGLTF_COMPONENT_TYPE_UNSIGNED_SHORT:
-        out[i] = elements.at<std::uint16_t>(i);
-        break;
-      case TINYGLTF_COMPONENT_TYPE_UNSIGNED_INT:
-        out[i] = elements.at<std::uint32_t>(i);
-        break;
-      default:
-        refuse("indices are of no unsigned type", where);
-    }
+  std::vector<std::uint32_t> out;
+  for (std::size_t i = 2; i < corners.size(); ++i) {
+    const bool strip = mode == TINYGLTF_MODE_TRIANGLE_STRIP;
+    out.insert(out.end(), {corners[strip ? i - 2 : 0], corners[i - 1], corners[i]});
   }
   return out;
 }
@@ -132,8 +89,10 @@ std::vector<std::uint32_t> indices_of(const tinygltf::Model& model, int accessor
 /// Walks a file's nodes and adds what they hold.
 class GltfReader {
  public:
-  GltfReader(const tinygltf::Model& model, const Placement& world_from_file, Mesh& mesh)
-      : model_(model), mesh_(mesh), seen_(model.nodes.size()) {
+  /// `notes`: what is known to be left out.
+  GltfReader(const tinygltf::Model& model, const Placement& world_from_file, Mesh& mesh,
+             std::set<std::string> notes)
+      : model_(model), mesh_(mesh), seen_(model.nodes.size()), notes_(std::move(notes)) {
     for (const Texture& texture : mesh.textures) texels_ += texture.rgb.size() / 3;
     first_material_ = static_cast<std::uint32_t>(mesh.materials.size());
     for (std::size_t i = 0; i < model.materials.size(); ++i) {
@@ -149,6 +108,7 @@ class GltfReader {
       notes_.insert("its lights are left out: flames are the light, and a scene file's");
     const Eigen::Matrix4d top = matrix_of(world_from_file) * world_axes();
     if (model.scenes.empty()) refuse("has no scene", "scenes");
+    if (model.scenes.size() > 1) notes_.insert("of its scenes, only the default one is shown");
     for (const int node : entry(model.scenes, std::max(0, model.defaultScene), "scene").nodes)
       walk(node, top, 0);
   }
@@ -181,6 +141,13 @@ class GltfReader {
     if (m.alphaMode != "OPAQUE") notes_.insert("transparent materials are shown opaque");
   }
 
+  void note_morphs(const tinygltf::Mesh& shape, const std::vector<double>& weights) {
+    const bool targets = std::any_of(shape.primitives.begin(), shape.primitives.end(),
+                                     [](const tinygltf::Primitive& p) { return !p.targets.empty(); });
+    if (targets && std::any_of(weights.begin(), weights.end(), [](double w) { return w != 0; }))
+      notes_.insert("morph weights are left out: shapes are drawn without their morph targets");
+  }
+
   void walk(int index, const Eigen::Matrix4d& world_from_parent, int depth) {
     const tinygltf::Node& node = entry(model_.nodes, index, "node");
     const std::string where = fmt::format("nodes[{}]", index);
@@ -189,9 +156,11 @@ class GltfReader {
     if (depth > kDeepestNode) refuse("lies too deep", where);
     seen_[static_cast<std::size_t>(index)] = true;
     const Eigen::Matrix4d world_from_node = world_from_parent * matrix_of(node, where);
-    if (node.mesh >= 0)
-      for (const tinygltf::Primitive& primitive : entry(model_.meshes, node.mesh, "mesh").primitives)
-        add(primitive, world_from_node, where);
+    if (node.mesh >= 0) {
+      const tinygltf::Mesh& shape = entry(model_.meshes, node.mesh, "mesh");
+      for (const tinygltf::Primitive& primitive : shape.primitives) add(primitive, world_from_node, where);
+      note_morphs(shape, node.weights.empty() ? shape.weights : node.weights);
+    }
     if (node.camera >= 0) add_camera(entry(model_.cameras, node.camera, "camera"), world_from_node, where);
     if (node.extras.IsObject() && node.extras.Has("emberlock_flame")) {
       const tinygltf::Value& result = node.extras.Get("emberlock_flame");
@@ -204,7 +173,10 @@ class GltfReader {
 
   void add_camera(const tinygltf::Camera& camera, const Eigen::Matrix4d& world_from_node,
                   const std::string& where) {
-    if (camera.type != "perspective") return;
+    if (camera.type != "perspective") {
+      notes_.insert("orthographic cameras are left out");
+      return;
+    }
     const double height = camera.perspective.yfov;
     if (!(height > 0 && height < 3.1)) refuse("a camera's yfov is out of range", where);
     const Eigen::Matrix4d forwards = Eigen::Vector4d(1, -1, -1, 1).asDiagonal();  // from OpenGL's axes
@@ -217,31 +189,24 @@ class GltfReader {
       notes_.insert("points and lines are left out");
       return;
     }
-    if (primitive.mode != TINYGLTF_MODE_TRIANGLES && primitive.mode != -1)
-      refuse("strips and fans of triangles can't be read", where, "Export single triangles");
     const auto position = primitive.attributes.find("POSITION");
     if (position == primitive.attributes.end()) refuse("a mesh has no POSITION", where);
-    const Elements places(model_, position->second, TINYGLTF_TYPE_VEC3, where);
-    if (places.kind() != TINYGLTF_COMPONENT_TYPE_FLOAT) refuse("POSITION isn't of floats", where);
+    const GltfElements places(model_, position->second, TINYGLTF_TYPE_VEC3, where);
     const std::size_t told =
         primitive.indices >= 0 ? entry(model_.accessors, primitive.indices, "accessor").count : places.size();
-    if (mesh_.triangles.size() + told / 3 > kMostTriangles ||
+    const bool single = primitive.mode == TINYGLTF_MODE_TRIANGLES || primitive.mode == -1;
+    if (mesh_.triangles.size() + (single ? told / 3 : told) > kMostTriangles ||
         mesh_.vertices.size() + places.size() > 3 * kMostTriangles)
       refuse(fmt::format("has more than {} triangles", kMostTriangles), where, "Simplify the geometry");
-    std::vector<std::uint32_t> corners;
-    if (primitive.indices >= 0) {
-      corners = indices_of(model_, primitive.indices, where);
-    } else {
-      corners.resize(places.size());
-      for (std::size_t i = 0; i < corners.size(); ++i) corners[i] = static_cast<std::uint32_t>(i);
-    }
-    const std::size_t count = corners.size() / 3;
+    std::vector<std::uint32_t> corners(places.size());
+    std::iota(corners.begin(), corners.end(), 0U);
+    if (primitive.indices >= 0)
+      corners = GltfElements(model_, primitive.indices, TINYGLTF_TYPE_SCALAR, where).indices(where);
+    corners = triangles_of(primitive.mode, std::move(corners));
     const auto base = static_cast<std::uint32_t>(mesh_.vertices.size());
     for (std::size_t i = 0; i < places.size(); ++i) {
-      const auto local = places.at<std::array<float, 3>>(i);
       const Eigen::Vector4d world =
-          world_from_node * Eigen::Vector4d(static_cast<double>(local[0]), static_cast<double>(local[1]),
-                                            static_cast<double>(local[2]), 1);
+          world_from_node * Eigen::Vector4d(places.at(i, 0), places.at(i, 1), places.at(i, 2), 1);
       if (!(world.cwiseAbs().maxCoeff() < 1e7)) refuse("a vertex isn't finite, or farther than 1e7 m", where);
       mesh_.vertices.push_back(
           {static_cast<float>(world[0]), static_cast<float>(world[1]), static_cast<float>(world[2])});
@@ -253,22 +218,21 @@ class GltfReader {
       add_texture_places(primitive, entry(model_.materials, primitive.material, "material"), base, where);
       material = static_cast<std::uint32_t>(primitive.material);
     }
-    for (std::size_t t = 0; t < count; ++t) {
+    for (std::size_t t = 0; t < corners.size(); t += 3) {
       for (std::size_t c = 0; c < 3; ++c)
-        if (corners[3 * t + c] >= places.size()) refuse("a triangle's corner isn't there", where);
-      mesh_.triangles.push_back(
-          {base + corners[3 * t], base + corners[3 * t + 1], base + corners[3 * t + 2]});
+        if (corners[t + c] >= places.size()) refuse("a triangle's corner isn't there", where);
+      mesh_.triangles.push_back({base + corners[t], base + corners[t + 1], base + corners[t + 2]});
       mesh_.material.push_back(first_material_ + material);
     }
   }
 
   /// A primitive's attribute for each of its vertices, from `base` on; null where it hasn't got it.
-  [[nodiscard]] std::optional<Elements> attribute(const tinygltf::Primitive& primitive,
-                                                  const std::string& name, int type, std::size_t base,
-                                                  const std::string& where) const {
+  [[nodiscard]] std::optional<GltfElements> attribute(const tinygltf::Primitive& primitive,
+                                                      const std::string& name, int type, std::size_t base,
+                                                      const std::string& where) const {
     const auto at = primitive.attributes.find(name);
     if (at == primitive.attributes.end()) return std::nullopt;
-    Elements elements(model_, at->second, type, where);
+    GltfElements elements(model_, at->second, type, where);
     if (elements.size() != mesh_.vertices.size() - base)
       refuse(fmt::format("{} isn't one for each vertex", name), where);
     return elements;
@@ -277,14 +241,13 @@ class GltfReader {
   void add_normals(const tinygltf::Primitive& primitive, const Eigen::Matrix3d& linear, std::size_t base,
                    const std::string& where) {
     const auto from = attribute(primitive, "NORMAL", TINYGLTF_TYPE_VEC3, base, where);
-    if (!from || from->kind() != TINYGLTF_COMPONENT_TYPE_FLOAT) return;
+    if (!from) return;
     mesh_.normals.resize(mesh_.vertices.size());
     // Cofactors: the inverse's transpose but for the scale, and there for flat matrices too.
     Eigen::Matrix3d turns;
     for (int a = 0; a < 3; ++a) turns.col(a) = linear.col((a + 1) % 3).cross(linear.col((a + 2) % 3));
     for (std::size_t i = 0; i < from->size(); ++i) {
-      const auto local = from->at<std::array<float, 3>>(i);
-      const Eigen::Vector3d normal = turns * Eigen::Vector3f(local[0], local[1], local[2]).cast<double>();
+      const Eigen::Vector3d normal = turns * Eigen::Vector3d(from->at(i, 0), from->at(i, 1), from->at(i, 2));
       const double length = normal.norm();
       if (!std::isfinite(length) || !(length > 0)) continue;
       for (std::size_t a = 0; a < 3; ++a)
@@ -301,21 +264,9 @@ class GltfReader {
     mesh_.texture_places.resize(mesh_.vertices.size());
     for (std::size_t i = 0; from && i < from->size(); ++i) {
       std::array<float, 2>& to = mesh_.texture_places[base + i];
-      for (std::size_t a = 0; a < 2; ++a) to[a] = coordinate(*from, i, a, where);
+      for (std::size_t a = 0; a < 2; ++a) to[a] = static_cast<float>(from->at(i, a));
+      if (!std::isfinite(to[0]) || !std::isfinite(to[1])) refuse("a place on a texture isn't finite", where);
     }
-  }
-  static float coordinate(const Elements& from, std::size_t i, std::size_t a, const std::string& where) {
-    float value = 0;
-    if (from.kind() == TINYGLTF_COMPONENT_TYPE_FLOAT)
-      value = from.at<std::array<float, 2>>(i)[a];
-    else if (from.kind() == TINYGLTF_COMPONENT_TYPE_UNSIGNED_BYTE)
-      value = static_cast<float>(from.at<std::array<std::uint8_t, 2>>(i)[a]) / 255;
-    else if (from.kind() == TINYGLTF_COMPONENT_TYPE_UNSIGNED_SHORT)
-      value = static_cast<float>(from.at<std::array<std::uint16_t, 2>>(i)[a]) / 65535;
-    else
-      refuse("a place on a texture is of no known type", where);
-    if (!std::isfinite(value)) refuse("a place on a texture isn't finite", where);
-    return value;
   }
 
   const tinygltf::Model& model_;
@@ -337,8 +288,22 @@ std::string_view json_of(std::string_view bytes) {
   return bytes.substr(kHeader, length);
 }
 
+/// What a glTF file names is read as any other file: nothing but regular ones.
+tinygltf::FsCallbacks regular_files() {
+  return {[](const std::string& path, void*) { return check_regular_file(path).ok(); },
+          [](const std::string& path, void*) { return path; },
+          [](std::vector<unsigned char>* out, std::string* error, const std::string& path, void*) {
+            const Result<std::string> bytes = read_file(path);
+            if (bytes) out->assign(bytes->begin(), bytes->end());
+            if (!bytes && error != nullptr) *error += bytes.error().message();
+            return bytes.ok();
+          },
+          nullptr, nullptr};
+}
+
 tinygltf::Model model_of(const std::string& bytes, const fs::path& file) {
   tinygltf::TinyGLTF loader;
+  loader.SetFsCallbacks(regular_files());
   // Pictures are kept as they are: those that are shown are decoded later, within bounds.
   loader.SetImageLoader(
       [](tinygltf::Image* image, int, std::string*, std::string*, int, int, const unsigned char* content,
@@ -358,11 +323,10 @@ tinygltf::Model model_of(const std::string& bytes, const fs::path& file) {
           : loader.LoadASCIIFromString(&model, &error, &warning, bytes.data(), size, folder);
   std::replace(error.begin(), error.end(), '\n', ' ');
   if (!done) refuse(error.empty() ? "is no glTF file" : "is no glTF file: " + error, {}, "Export it again");
-  static const std::set<std::string> harmless{"KHR_materials_emissive_strength", "KHR_materials_unlit",
-                                              "KHR_texture_transform", "KHR_lights_punctual"};
   for (const std::string& extension : model.extensionsRequired)
-    if (!harmless.contains(extension))
-      refuse("needs the extension " + extension, "extensionsRequired", "Export without it (no compression)");
+    if (extension != "KHR_materials_unlit" && !is_heeded(extension))
+      refuse("needs the extension " + session::printable(extension), "extensionsRequired",
+             "Export without it (no compression)");
   return model;
 }
 
@@ -376,7 +340,8 @@ Result<GltfScene> read_gltf(const fs::path& file, const Placement& world_from_fi
 Result<GltfScene> parse_gltf(const std::string& bytes, const fs::path& file, const Placement& world_from_file,
                              Mesh& mesh) try {
   EMBERLOCK_RETURN_IF_ERROR(check_json_nesting(json_of(bytes), file.string()));
-  return GltfReader(model_of(bytes, file), world_from_file, mesh).found();
+  const tinygltf::Model model = model_of(bytes, file);
+  return GltfReader(model, world_from_file, mesh, extensions_left_out(json_of(bytes))).found();
 } catch (const Unreadable& e) {
   return in_file(e.error, file.string());
 } catch (const std::exception& e) {

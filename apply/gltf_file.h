@@ -54,10 +54,11 @@ struct GltfScene {
 /// Adds the triangles of a .gltf or .glb file's scene to `mesh`, at their nodes' places. glTF's y axis
 /// becomes z, its z -y, as in Blender; then the file is placed. Of materials, the base colour's factor and
 /// texture and the emission's factor count (KHR_materials_emissive_strength too). Vertices' normals are
-/// taken. Other textures, metal, transparency, skins and animation are left out, which `notes` tell. Errors:
-/// bad_input: not glTF, a required extension, a missing or short buffer or picture, pictures larger than
-/// kMostTexels in all, indices out of range, a node that is reached twice (a cycle too), values that aren't
-/// finite, more than kMostTriangles. `mesh` is undefined after an error.
+/// taken. Strips, fans, sparse accessors and quantised meshes (KHR_mesh_quantization) are read. Other
+/// textures, metal, transparency, skins, morph weights, animation and other extensions are left out, each of
+/// which is in `notes`. Errors: bad_input: not glTF, a required extension, a missing or short buffer or
+/// picture, pictures larger than kMostTexels in all, indices out of range, a node that is reached twice (a
+/// cycle too), values that aren't finite, more than kMostTriangles. `mesh` is undefined after an error.
 Result<GltfScene> read_gltf(const std::filesystem::path& file, const Placement& world_from_file, Mesh& mesh);
 /// The same of what the file holds; buffers beside it are looked for in its folder.
 Result<GltfScene> parse_gltf(const std::string& bytes, const std::filesystem::path& file,

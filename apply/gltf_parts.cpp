@@ -3,7 +3,10 @@
 
 #include <algorithm>
 
+#include <nlohmann/json.hpp>
+
 #include "session/media/frame_decoders.h"
+#include "session/text.h"
 
 namespace emberlock::apply {
 namespace {
@@ -29,7 +32,41 @@ Wrap wrap_of(int gltf) {
   return gltf == TINYGLTF_TEXTURE_WRAP_MIRRORED_REPEAT ? Wrap::mirror : Wrap::repeat;
 }
 
+/// The names of `extensions` of any object.
+void add_used(const nlohmann::json& json, std::set<std::string>& names) {
+  if (!json.is_structured()) return;
+  for (const auto& [key, value] : json.items()) {
+    if (json.is_object() && key == "extras") continue;
+    if (json.is_object() && key == "extensions" && value.is_object())
+      for (const auto& [name, content] : value.items()) names.insert(name);
+    add_used(value, names);
+  }
+}
+
 }  // namespace
+
+bool is_heeded(const std::string& extension) {
+  // Lights and transforms of textures have notes of their own; XMP is metadata.
+  static const std::set<std::string> kHeeded{"KHR_materials_emissive_strength",
+                                             "KHR_lights_punctual",
+                                             "KHR_texture_transform",
+                                             "KHR_mesh_quantization",
+                                             "KHR_xmp",
+                                             "KHR_xmp_json_ld"};
+  return kHeeded.contains(extension);
+}
+
+std::set<std::string> extensions_left_out(std::string_view text) {
+  std::set<std::string> names, notes;
+  const auto json = nlohmann::json::parse(text, nullptr, false);
+  add_used(json, names);
+  if (json.is_object() && json.contains("extensionsUsed"))
+    for (const auto& name : json["extensionsUsed"])
+      if (name.is_string()) names.insert(name.get<std::string>());
+  for (const std::string& name : names)
+    if (!is_heeded(name)) notes.insert("the extension " + session::printable(name) + " is left out");
+  return notes;
+}
 
 Material material_of(const tinygltf::Material& from, const std::string& where) {
   Material out;

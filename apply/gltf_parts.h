@@ -2,7 +2,9 @@
 #pragma once
 
 #include <cstddef>
+#include <set>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include <fmt/format.h>
@@ -21,6 +23,11 @@ const T& entry(const std::vector<T>& all, int index, const std::string& what) {
     refuse(fmt::format("{} {} isn't there", what, index), what);
   return all[static_cast<std::size_t>(index)];
 }
+
+/// Whether the reader takes what an extension of glTF adds, or the extension changes no picture.
+bool is_heeded(const std::string& extension);
+/// One sentence for each other extension that a file lists or uses, by its name. `json`: the file's.
+std::set<std::string> extensions_left_out(std::string_view json);
 
 /// Its factors; the texture is left to texture_of().
 Material material_of(const tinygltf::Material& from, const std::string& where);

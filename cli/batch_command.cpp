@@ -11,13 +11,13 @@
 #include <vector>
 
 #include <fmt/format.h>
-#include <fmt/ranges.h>
 
 #include "cli/batch_result.h"
 #include "cli/batch_run.h"
 #include "cli/batch_slurm.h"
 #include "cli/commands.h"
 #include "cli/reconstruct_arguments.h"
+#include "cli/sequence_state.h"
 #include "recon/batch/ledger.h"
 #include "recon/batch/plan.h"
 #include "recon/batch/pulse.h"
@@ -69,20 +69,6 @@ std::string absolute(const std::string& path) {
   return fs::absolute(path, ec).lexically_normal().string();
 }
 
-/// As it is meant in every folder.
-std::string value_of(const Option& option) {
-  static const std::set<std::string> kPaths{"--out", "--rig", "--response", "--key"};
-  const std::string value = fmt::format("{}", fmt::join(option.values(), ","));
-  return kPaths.contains(option.name()) ? absolute(value) : value;
-}
-
-std::map<std::string, std::string> given_to(const Verb& verb) {
-  std::map<std::string, std::string> given;
-  for (const Option& option : verb.given_options())
-    if (!of_a_run().contains(option.name())) given[option.name()] = value_of(option);
-  return given;
-}
-
 // --- submit
 
 struct SubmitArguments {
@@ -108,7 +94,7 @@ std::vector<std::string> words_of(const SubmitArguments& s, const Verb& verb,
 void submit_command(SubmitArguments& s, const Verb& verb) {
   static const std::set<std::string> kOfSlurm{"--nodes", "--ranks", "--gpus", "--cpus", "--time", "--sbatch"};
   check_given(s.batch);
-  s.batch.options = given_to(verb);
+  s.batch.options = given_options(verb, of_a_run());
   for (const std::string& name : kOfSlurm) s.batch.options.erase(name);
   or_fail(asked_plan(s.batch));
   const fs::path out = absolute(s.batch.reconstruct.out);
@@ -189,7 +175,7 @@ void add_batch(const Verb& app) {
     arguments->reconstruct.certificate.program = app.version();
     if (verb.verb_is_given()) return;
     check_given(*arguments);
-    arguments->options = given_to(verb);
+    arguments->options = given_options(verb, of_a_run());
     run_batch_rank(*arguments,
                    recon::rank_from([](const char* name) -> const char* { return std::getenv(name); }));
   });

@@ -10,6 +10,7 @@
 #include "base/file.h"
 #include "base/output_folder.h"
 #include "cli/outputs.h"
+#include "cli/sequence_state.h"
 
 namespace emberlock::cli {
 namespace {
@@ -66,6 +67,21 @@ Status sign(const fs::path& chunk, const recon::Worker& worker) {
 
 fs::path volume_in(const fs::path& chunk, std::uint64_t frame) {
   return chunk / fmt::format("frame-{}", frame) / "volume.vdb";
+}
+
+bool chunk_holds(const fs::path& chunk, std::size_t frames) {
+  const fs::path path = chunk / "sequence" / "frames.json";
+  const auto text = read_file(path);
+  const auto told = text ? report::parse_sequence(*text, path.string()) : text.error();
+  if (!told) {
+    std::error_code ec;
+    fs::remove_all(path.parent_path(), ec);
+    return false;
+  }
+  return told->frames.size() >= frames &&
+         std::all_of(told->frames.begin(), told->frames.end(), [&](const report::SequenceFrame& frame) {
+           return frame.error.empty() && holds_volume(volume_in(chunk, frame.frame).parent_path(), frame);
+         });
 }
 
 Status link_volumes(const fs::path& out, const recon::Chunk& chunk) {

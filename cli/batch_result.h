@@ -25,6 +25,9 @@ std::size_t frames_done(const recon::Ledger& ledger, const recon::BatchPlan& pla
 Status sign(const std::filesystem::path& chunk, const recon::Worker& worker);
 /// Where a chunk's folder has this frame's volume.
 std::filesystem::path volume_in(const std::filesystem::path& chunk, std::uint64_t frame);
+/// Whether a done chunk's folder holds the volumes of all its frames. A list of them that can't be read is
+/// removed, so that all are made again.
+bool chunk_holds(const std::filesystem::path& chunk, std::size_t frames);
 /// Links to a done chunk's volumes. Error: io.
 Status link_volumes(const std::filesystem::path& out, const recon::Chunk& chunk);
 

@@ -27,6 +27,7 @@
 #include "cli/commands.h"
 #include "cli/frames_in_turn.h"
 #include "cli/interrupt.h"
+#include "cli/sequence_state.h"
 #include "recon/batch/ledger.h"
 #include "recon/batch/plan.h"
 #include "recon/batch/pulse.h"
@@ -45,13 +46,6 @@ constexpr const char* kGoesOn = "The same command goes on where it ended, on any
 constexpr std::uint64_t kMostFramesOfBatch = 100'000;
 constexpr const char* kMarkOfTelling = "told";  ///< in the ledger, where the report of all is written
 constexpr const char* kOfSlurm = "slurm";       ///< `batch submit` puts it beside the ledger
-
-/// What tells a session from others.
-std::string identity_of(const session::SessionReader& session) {
-  const v1::Manifest& manifest = session.manifest();
-  return fmt::format("{} of {}, {} cameras, {} frames", manifest.session_id(), manifest.created_utc(),
-                     session.camera_count(), session.camera_count() == 0 ? 0 : session.stamps(0).size());
-}
 
 /// The processors that this process may run on.
 int allowed_cores() {
@@ -75,6 +69,7 @@ class BatchRank {
     std::vector<std::string> names;
     for (const auto& [name, chunk] : chunks_) names.push_back(name);
     ledger_.emplace(ledger_of(out_), std::move(names), me_.name());
+    EMBERLOCK_RETURN_IF_ERROR(ledger_->restore_folders());
     EMBERLOCK_ASSIGN_OR_RETURN(pulse_, recon::Pulse::start(ledger_->folder() / "workers", me_,
                                                            Seconds(arguments_.patience_s), clock_));
     if (rank_.number == 0) {
@@ -166,15 +161,15 @@ class BatchRank {
     return {};
   }
 
-  /// Chunks that were given up, or hold frames that failed.
+  /// Chunks that were given up, or hold frames that failed or whose volume is no longer there.
   Status try_again_what_failed() {
     std::error_code ec;
     ledger_->forget_losses();
     fs::remove(ledger_->folder() / kMarkOfTelling, ec);
-    EMBERLOCK_ASSIGN_OR_RETURN(const report::BatchTold told, told_of(*ledger_, plan_));
-    for (const report::BatchChunk& chunk : told.chunks) {
-      if ((!chunk.done || chunk.failed == 0) && !ledger_->given_up(chunk.name)) continue;
-      EMBERLOCK_RETURN_IF_ERROR(ledger_->reopen(chunk.name));
+    for (const auto& [name, chunk] : chunks_) {
+      const bool again = ledger_->done(name) ? !chunk_holds(ledger_->result(name), chunk.frames.size())
+                                             : ledger_->given_up(name);
+      if (again) EMBERLOCK_RETURN_IF_ERROR(ledger_->reopen(name));
     }
     return {};
   }
@@ -193,7 +188,10 @@ class BatchRank {
       } else if (ledger_->settled()) {
         break;
       } else {
-        wait_idly();
+        EMBERLOCK_ASSIGN_OR_RETURN(const std::vector<std::string> missing, ledger_->restore_missing());
+        for (const std::string& chunk : missing)
+          say("again", fmt::format("frames {}: their result was removed", chunk));
+        if (missing.empty()) wait_idly();
       }
     }
     return {};

@@ -21,7 +21,6 @@
 #include "cli/numbers.h"
 #include "cli/outputs.h"
 #include "cli/result_files.h"
-#include "recon/export/certificate.h"
 #include "recon/export/nanovdb_file.h"
 #include "recon/export/volume_file.h"
 #include "recon/export/vti_file.h"
@@ -81,10 +80,7 @@ void warn_of_missing(const ExportArguments& a, const std::vector<ResultVolume>& 
   std::vector<std::uint64_t> missing = missing_frames(a.result, all);
   if (a.frames)
     std::erase_if(missing, [&](std::uint64_t f) { return f < a.frames->first || f > a.frames->second; });
-  if (missing.empty()) return;
-  const bool one = missing.size() == 1;
-  std::fprintf(stderr, "%-16s %s %s %s missing\n", "warning", one ? "frame" : "frames",
-               numbers_in_words(missing).c_str(), one ? "is" : "are");
+  warn_of_missing(missing);
 }
 
 Error lacks_grid(const std::string& name, const recon::SharedVolume& volume, const fs::path& file) {
@@ -137,13 +133,6 @@ Result<float> white_of(const ExportArguments& a, const std::vector<ResultVolume>
   float white = 0;
   bool empty = true;
   const Status read = each_volume(volumes, a.out, bar, 0, kShare, [&](const ResultVolume& from) -> Status {
-    // Of a file that was changed its certificate says more than its reader.
-    if (const auto certified = recon::check_volume(from.file);
-        !certified && certified.error().kind == ErrorKind::refused) {
-      Error changed = certified.error();
-      changed.kind = ErrorKind::bad_input;
-      return changed;
-    }
     EMBERLOCK_ASSIGN_OR_RETURN(const recon::SharedVolume volume, recon::read_shared_volume(from.file));
     white = std::max(white, recon::brightest(volume));
     for (const recon::SharedGrid& grid : volume.grids)

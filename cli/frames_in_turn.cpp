@@ -20,8 +20,11 @@
 #include "cli/interrupt.h"
 #include "cli/outputs.h"
 #include "cli/reconstruct_files.h"
+#include "cli/sequence_state.h"
 #include "recon/adjust/picture_error.h"
+#include "recon/batch/plan.h"
 #include "recon/export/volume_file.h"
+#include "recon/export/volume_kind.h"
 #include "recon/pipeline/frame_sequence.h"
 #include "recon/preprocess/radiance.h"
 #include "recon/views/flame_mask.h"
@@ -79,13 +82,17 @@ class FramesInTurn {
   Status work() {
     for (; at_ < frames_.size() && !watch_.stop() && !hopeless(); ++at_) {
       const bool tried = at_ < told_.frames.size();
-      if (tried && told_.frames[at_].error.empty())
+      const bool done = tried && told_.frames[at_].error.empty();
+      if (done && holds_volume(folder_of(frames_[at_]), told_.frames[at_]))
         continue;  // of an earlier run, and still what it would be
+      if (done) remove_if_cut(folder_of(frames_[at_]) / "volume.vdb");
       EMBERLOCK_RETURN_IF_ERROR(go_on_behind_those_done());
-      watch_.say(label() + (tried ? ", which failed before" : ""));
-      EMBERLOCK_ASSIGN_OR_RETURN(const std::optional<Status> done, reconstruct(frames_[at_]));
-      if (!done) break;  // ended early: half a frame is none, and done again
-      if (!done->ok()) watch_.say(fmt::format("emberlock: {}: {}", label(), done->error().message()));
+      watch_.say(label() + (done    ? ", whose volume.vdb is missing or damaged"
+                            : tried ? ", which failed before"
+                                    : ""));
+      EMBERLOCK_ASSIGN_OR_RETURN(const std::optional<Status> ended, reconstruct(frames_[at_]));
+      if (!ended) break;  // early: half a frame is none, and done again
+      if (!ended->ok()) watch_.say(fmt::format("emberlock: {}: {}", label(), ended->error().message()));
       untold_ = true;
       if (clock_.now() >= write_again_) EMBERLOCK_RETURN_IF_ERROR(write());
     }
@@ -137,6 +144,7 @@ class FramesInTurn {
     }
     row.loading = written->loading;
     row.writing = written->writing;
+    row.volume = listed_hash_of_volume(folder_of(frame));
     if (written->outcome.report.stopped) return std::optional<Status>();
     told_.instants = arguments_.instants;
     told_.voxels = written->outcome.report.voxel_choice.voxels;
@@ -146,9 +154,11 @@ class FramesInTurn {
   }
 
   /// Frames of an earlier run behind one that failed then hold as long as it fails; once it is a volume they
-  /// would start from that, and are done again.
+  /// would start from that, and are done again, unless it is the same volume as before.
   void keep(const SequenceFrame& row) {
-    if (row.error.empty()) told_.frames.resize(at_);
+    const bool same =
+        at_ < told_.frames.size() && !row.volume.empty() && told_.frames[at_].volume == row.volume;
+    if (row.error.empty() && !same) told_.frames.resize(at_);
     if (at_ == told_.frames.size()) told_.frames.emplace_back();
     told_.frames[at_] = row;
   }
@@ -193,19 +203,43 @@ class FramesInTurn {
   /// What an earlier run has done.
   Status take_up() {
     const fs::path path = request().target / kTold;
-    if (std::error_code ec; !fs::exists(path, ec)) return {};
-    EMBERLOCK_ASSIGN_OR_RETURN(const std::string text, read_file(path));
-    EMBERLOCK_ASSIGN_OR_RETURN(told_, report::parse_sequence(text, path.string()));
-    if (!told_.frames.empty() && told_.instants != arguments_.instants)
+    if (std::error_code ec; fs::exists(path, ec)) {
+      EMBERLOCK_ASSIGN_OR_RETURN(const std::string text, read_file(path));
+      EMBERLOCK_ASSIGN_OR_RETURN(told_, report::parse_sequence(text, path.string()));
+      if (failed(told_) == told_.frames.size()) told_ = {};  // nothing of it stays
+      if (!told_.frames.empty()) EMBERLOCK_RETURN_IF_ERROR(check_same_run());
+    }
+    told_.session = arguments_.session;
+    told_.options = arguments_.options;
+    return {};
+  }
+  [[nodiscard]] Status check_same_run() const {
+    if (told_.instants != arguments_.instants)
       return another(fmt::format("holds a sequence of {} instants a frame period", told_.instants));
     for (std::size_t i = 0; i < told_.frames.size(); ++i)
       if (i >= frames_.size() || told_.frames[i].frame != frames_[i])
         return another("holds a sequence of other frames");
-    return {};
+    if (arguments_.session.empty()) return {};  // as a batch, which compares its plan
+    if (told_.session.empty()) {
+      watch_.say("An earlier version made the frames in " + out_.string() +
+                 ": with which options isn't known, they are taken for the same");
+      return {};
+    }
+    if (told_.session != arguments_.session)
+      return another(
+          fmt::format("holds frames of another session, {}, not {}", told_.session, arguments_.session));
+    const std::string other = recon::other_option(told_.options, arguments_.options);
+    return other.empty() ? Status() : another("holds frames of other options: " + other);
   }
   [[nodiscard]] Error another(std::string what) const {
     return {ErrorKind::bad_input, std::move(what), out_.string(),
-            "Give another --out, or remove this folder to begin anew"};
+            "Give what that run was given, to go on with it, or another --out, or remove this folder"};
+  }
+  /// The rest of a volume that was cut would stand in the way of the whole one.
+  static void remove_if_cut(const fs::path& volume) {
+    std::error_code ec;
+    const auto kind = recon::kind_of_volume(volume);
+    if (kind && *kind == recon::VolumeKind::cut_short) fs::remove(volume, ec);
   }
 
   /// The state in which the last volume before the next frame left the sequence.
@@ -273,9 +307,12 @@ class FramesInTurn {
     EMBERLOCK_ASSIGN_OR_RETURN(const recon::Scene scene, load_views(arguments_of(frame), {}));
     std::vector<Image> renders;
     for (const std::size_t v : looked_at(scene)) {
-      EMBERLOCK_ASSIGN_OR_RETURN(
-          Image render, session::read_image(folder_of(frame) / "views" / fmt::format("{:04}.png", v)));
-      renders.push_back(std::move(render));
+      Result<Image> render = session::read_image(folder_of(frame) / "views" / fmt::format("{:04}.png", v));
+      if (!render) {  // removed: how the next frame flickers isn't known then
+        last_shown_.reset();
+        return {};
+      }
+      renders.push_back(*std::move(render));
     }
     last_shown_ = show(scene, std::move(renders));
     return {};

@@ -14,6 +14,7 @@
 #include "cli/commands.h"
 #include "cli/numbers.h"
 #include "cli/outputs.h"
+#include "cli/result_files.h"
 #include "cli/up_axis.h"
 #include "recon/export/volume_file.h"
 #include "recon/temperature/radiant.h"
@@ -74,10 +75,22 @@ Result<Targets> parse_targets(const MeasureArguments& arguments) {
   return targets;
 }
 
-/// A result's folder stands for its volume.
-fs::path file_of(const std::string& name) {
-  std::error_code ec;
-  return fs::is_directory(name, ec) ? fs::path(name) / "volume.vdb" : fs::path(name);
+/// A volume's file, and how it is called.
+struct NamedVolume {
+  std::string name;
+  fs::path file;
+};
+
+/// A result's folder stands for its volume, and a sequence's for those of its frames.
+Result<std::vector<NamedVolume>> volumes_in(const std::vector<std::string>& results) {
+  std::vector<NamedVolume> all;
+  for (const std::string& result : results) {
+    EMBERLOCK_ASSIGN_OR_RETURN(const std::vector<ResultVolume> volumes, volumes_of(result));
+    warn_of_missing(missing_frames(result, volumes));
+    for (const ResultVolume& volume : volumes)
+      all.push_back({is_sequence(result) ? volume.file.parent_path().string() : result, volume.file});
+  }
+  return all;
 }
 
 Measured::Heat heat_of(const recon::HotVolume& hot, const Targets& targets,
@@ -110,9 +123,9 @@ Status check_sphere(const recon::SphereFlux& flux) {
                "--target-sphere", "Give a radius that holds all of it, or a sphere beside the flame"};
 }
 
-Result<Measured> measured(const std::string& name, const Targets& targets, const Eigen::Vector3d& up,
+Result<Measured> measured(const NamedVolume& from, const Targets& targets, const Eigen::Vector3d& up,
                           const recon::ComputeOptions& compute) {
-  const fs::path file = file_of(name);
+  const fs::path& file = from.file;
   EMBERLOCK_ASSIGN_OR_RETURN(const recon::Volume volume, recon::read_volume(file));
   EMBERLOCK_ASSIGN_OR_RETURN(const auto kelvin, recon::read_values(file, "temperature", volume.grid));
   EMBERLOCK_ASSIGN_OR_RETURN(const auto errors, recon::read_values(file, "temperature_sigma", volume.grid));
@@ -131,7 +144,7 @@ Result<Measured> measured(const std::string& name, const Targets& targets, const
   const std::vector<float> share = recon::shares_inside(volume);
   for (std::size_t p = 0; p < share.size(); ++p) hot.absorption[p] *= share[p];
   Measured out;
-  out.name = name;
+  out.name = from.name;
   out.statistics = recon::statistics_of(hot, sigma, up);
   if (out.statistics.points == 0)
     return Error{ErrorKind::bad_input, "no voxel tells a temperature", file.string(),
@@ -223,15 +236,16 @@ Status write_measures(const std::vector<Measured>& all, const OutputRequest& req
 
 void measure(const MeasureArguments& arguments) {
   const Targets targets = or_fail(parse_targets(arguments));
-  const Eigen::Vector3d up = or_fail(up_axis(arguments.up, arguments.volumes.front()));
+  const std::vector<NamedVolume> volumes = or_fail(volumes_in(arguments.volumes));
+  const Eigen::Vector3d up = or_fail(up_axis(arguments.up, volumes.front().file));
   const OutputRequest request{arguments.out, kMeasure, {arguments.volumes.begin(), arguments.volumes.end()}};
   if (!arguments.out.empty()) or_fail(OutputFolder::check(request));
   recon::ComputeOptions compute;
   compute.threads = arguments.threads;
   std::vector<Measured> all;
-  all.reserve(arguments.volumes.size());
-  for (const std::string& name : arguments.volumes) {
-    all.push_back(or_fail(measured(name, targets, up, compute)));
+  all.reserve(volumes.size());
+  for (const NamedVolume& volume : volumes) {
+    all.push_back(or_fail(measured(volume, targets, up, compute)));
     print(all.back());
   }
   if (arguments.out.empty()) return;
@@ -248,7 +262,7 @@ void add_measure(const Verb& app) {
       "measure", "Measures what flames radiate: power, flux on a surface, temperatures, height and volume");
   verb.add_option(
           "VOLUMES", a.volumes,
-          "Results of `reconstruct --quantity temperature`: folders or volume.vdb, a sequence's in its order")
+          "Results of `reconstruct --quantity temperature`: folders, also of sequences, or volume.vdb")
       .require();
   verb.add_option(
       "--target", a.target,

@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
+#include <map>
 #include <memory>
 #include <optional>
 #include <string>
@@ -59,6 +60,10 @@ struct ReconstructArguments {
   std::optional<int> progress_fd;
   DaemonReconstruction by_daemon;
   std::shared_ptr<recon::SharedRecording> recording = {};  ///< of a sequence's frames
+  /// What a sequence's frames.json states, so that a later run with others is refused: identity_of() the
+  /// session, and the options that were given. Without a session nothing is compared.
+  std::string session = {};
+  std::map<std::string, std::string> options = {};
   CertificateArguments certificate;
 };
 

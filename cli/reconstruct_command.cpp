@@ -20,6 +20,7 @@
 #include "cli/reconstruct_sequence.h"
 #include "cli/reconstruct_summary.h"
 #include "cli/scene_options.h"
+#include "cli/sequence_state.h"
 #include "recon/calibrate/rig.h"
 #include "recon/export/temperature_look_up.h"
 #include "recon/pipeline/coverage.h"
@@ -126,7 +127,7 @@ Status reconstruct_and_tell(const ReconstructArguments& arguments) {
 }
 
 /// The frames from --frame to --last-frame: each from where the one before ended, or each for itself.
-void reconstruct_range(const ReconstructArguments& arguments) {
+void reconstruct_range(ReconstructArguments arguments) {
   const auto instants = static_cast<std::uint64_t>(arguments.instants);
   const auto session = or_fail(session::SessionReader::open(arguments.input));
   const std::uint64_t recorded = session.camera_count() == 0 ? 0 : session.stamps(0).size();
@@ -137,6 +138,7 @@ void reconstruct_range(const ReconstructArguments& arguments) {
                                   arguments.every};
   const std::vector<std::uint64_t> frames =
       or_fail(session::frames_of(range, recorded * instants, arguments.range));
+  arguments.session = identity_of(session);
   if (arguments.at_once == 1 && !arguments.cold) return reconstruct_in_turn(arguments, frames);
   const int at_once = std::min(arguments.at_once, static_cast<int>(frames.size()));
   const auto recording = std::make_shared<recon::SharedRecording>();
@@ -151,6 +153,14 @@ void reconstruct_range(const ReconstructArguments& arguments) {
                        {reconstruct, [&](const Written& written, const std::filesystem::path& out) {
                           return conclude(written, {arguments.input, out.string(), arguments.by_daemon.json});
                         }});
+}
+
+/// Options on which a sequence's volumes don't depend, or that are compared by themselves.
+const std::set<std::string>& of_a_sequences_run() {
+  static const std::set<std::string> kNames{
+      "input",     "--out",    "--frame",   "--last-frame", "--frames", "--every",      "--instants",
+      "--threads", "--device", "--at-once", "--cold",       "--json",   "--progress-fd"};
+  return kNames;
 }
 
 void reconstruct_command(const ReconstructArguments& arguments) {
@@ -216,6 +226,7 @@ void add_reconstruct(const Verb& app) {
     for (const char* option : {"--every", "--cold", "--at-once", "--instants"})
       if (verb.is_given(option) && !arguments->last_frame)
         throw UsageError(std::string(option) + " requires --frames or --last-frame");
+    arguments->options = given_options(verb, of_a_sequences_run());
     if (!by_daemon.is_given()) return reconstruct_command(*arguments);
     reconstruct_by_daemon(asked_of_daemon(*arguments, verb));
   });

@@ -61,11 +61,12 @@ Result<Eigen::Vector3d> parse_place(const std::string& text, const char* option)
   return Error{ErrorKind::bad_input, "\"" + text + "\" is no place", option, "Give x,y,z in metres"};
 }
 
-/// What the result was reconstructed from, by its report.json.
-Result<std::string> input_of(const fs::path& result) {
-  std::string input = reported(result, "input");
+/// What a volume was reconstructed from, by the report.json in its folder.
+Result<std::string> input_of(const fs::path& volume) {
+  std::string input = reported(volume, "input");
   if (!input.empty()) return input;
-  return Error{ErrorKind::bad_input, "doesn't tell what was reconstructed", (result / "report.json").string(),
+  return Error{ErrorKind::bad_input, "doesn't state what was reconstructed",
+               (volume.parent_path() / "report.json").string(),
                "Give --input, the session or transforms.json whose cameras are followed"};
 }
 
@@ -74,14 +75,15 @@ struct Filmed {
   fs::path input;
   recon::SceneOptions options;
 };
-Result<std::optional<Filmed>> filmed_by(const RenderArguments& a, const recon::Box& box) {
+Result<std::optional<Filmed>> filmed_by(const RenderArguments& a, const fs::path& volume,
+                                        const recon::Box& box) {
   if (a.path != "cameras") return std::optional<Filmed>();
   Filmed filmed{a.input, {}};
   filmed.options.box = box;
   filmed.options.threads = a.threads;
   filmed.options.progress = progress_bar("cameras");
   if (a.input.empty()) {
-    EMBERLOCK_ASSIGN_OR_RETURN(filmed.input, input_of(a.result));
+    EMBERLOCK_ASSIGN_OR_RETURN(filmed.input, input_of(volume));
   }
   if (!a.rig.empty()) filmed.options.rig = a.rig;
   return std::optional(std::move(filmed));
@@ -100,9 +102,10 @@ Result<std::vector<recon::CameraModel>> along_cameras(const Filmed& filmed, cons
   return recon::through(stops, pivot, size, frames);
 }
 
-Result<std::vector<recon::CameraModel>> cameras_of(const RenderArguments& a, const recon::Box& box,
-                                                   const std::optional<Filmed>& filmed, ImageSize size) {
-  EMBERLOCK_ASSIGN_OR_RETURN(const Eigen::Vector3d up, up_axis(a.up, a.result));
+Result<std::vector<recon::CameraModel>> cameras_of(const RenderArguments& a, const fs::path& volume,
+                                                   const recon::Box& box, const std::optional<Filmed>& filmed,
+                                                   ImageSize size) {
+  EMBERLOCK_ASSIGN_OR_RETURN(const Eigen::Vector3d up, up_axis(a.up, volume));
   Eigen::Vector3d at = box.center;
   if (!a.look_at.empty()) {
     EMBERLOCK_ASSIGN_OR_RETURN(at, parse_place(a.look_at, "--look-at"));
@@ -173,7 +176,11 @@ RenderSome temperatures(const RenderArguments& a, const recon::ShownVolume& show
   };
 }
 
-Status render_all(const RenderArguments& a, const RenderSome& render_some,
+/// What renders a volume, by its number in the sequence.
+using RenderOf = std::function<Result<RenderSome>(std::size_t volume)>;
+
+/// One picture for each camera of the path; the volumes pass meanwhile, evenly.
+Status render_all(const RenderArguments& a, const RenderOf& render_of, std::size_t volumes,
                   const std::vector<recon::CameraModel>& path, FrameFiles& files) {
   constexpr std::size_t kPixelsAtOnce = 4'000'000;
   const ImageSize size = path.front().intrinsics.size;
@@ -181,12 +188,20 @@ Status render_all(const RenderArguments& a, const RenderSome& render_some,
   const std::size_t at_once = std::clamp<std::size_t>(kPixelsAtOnce / pixels, 1, 8);
   const Progress bar = progress_bar("render");
   const Interrupt interrupt;
-  for (std::size_t first = 0; first < path.size(); first += at_once) {
+  std::optional<std::size_t> volume;
+  RenderSome render_some;
+  for (std::size_t first = 0; first < path.size();) {
     if (Interrupt::asked())
       return Error{ErrorKind::refused, fmt::format("ended early, as asked, before frame {}", first), a.out};
     tell(bar, static_cast<double>(first) / static_cast<double>(path.size()), fmt::format("frame {}", first));
+    const auto volume_at = [&](std::size_t picture) { return picture * volumes / path.size(); };
+    if (volume != volume_at(first)) {
+      volume = volume_at(first);
+      EMBERLOCK_ASSIGN_OR_RETURN(render_some, render_of(*volume));
+    }
     std::vector<const recon::CameraModel*> some;
-    for (std::size_t i = first; i < std::min(path.size(), first + at_once); ++i) some.push_back(&path[i]);
+    for (; first < path.size() && some.size() < at_once && volume_at(first) == *volume; ++first)
+      some.push_back(&path[first]);
     EMBERLOCK_RETURN_IF_ERROR(render_some(some, files));
   }
   EMBERLOCK_RETURN_IF_ERROR(files.close());
@@ -222,9 +237,10 @@ Status check(const RenderArguments& a, ImageSize size) {
   return {};
 }
 
-/// The result in the light that is asked for.
-Result<recon::ShownVolume> shown_volume(const RenderArguments& a, const recon::ComputeOptions& compute) {
-  EMBERLOCK_ASSIGN_OR_RETURN(recon::ShownVolume shown, recon::read_shown_volume(a.result));
+/// A volume in the light that is asked for.
+Result<recon::ShownVolume> shown_volume(const RenderArguments& a, const fs::path& volume,
+                                        const recon::ComputeOptions& compute) {
+  EMBERLOCK_ASSIGN_OR_RETURN(recon::ShownVolume shown, recon::read_shown_volume(volume));
   if (a.light.empty()) return shown;
   const auto asked = recon::parse_effects("light=" + a.light);
   if (!asked || a.light.find(',') != std::string::npos)
@@ -242,7 +258,22 @@ void print_lighting(const recon::Lighting& lighting) {
     if (!words.empty()) std::printf("%-16s %s\n", name, words.c_str());
 }
 
-Status render(const RenderArguments& a, const Verb& verb) try {
+/// The colours' ends, for all volumes alike. Error: none of them has temperatures.
+Result<recon::BarEnds> ends_of(const RenderArguments& a, const std::vector<ResultVolume>& volumes) {
+  std::optional<recon::BarEnds> all;
+  for (const ResultVolume& volume : volumes) {
+    EMBERLOCK_ASSIGN_OR_RETURN(const recon::ShownVolume shown, recon::read_shown_volume(volume.file));
+    if (std::none_of(shown.kelvin.begin(), shown.kelvin.end(), [](float t) { return t > 0; })) continue;
+    const recon::BarEnds ends = recon::middle_by_light(shown.kelvin, shown.volume.emission);
+    if (!all) all = ends;
+    all = recon::BarEnds{std::min(all->low, ends.low), std::max(all->high, ends.high)};
+  }
+  if (all) return recon::kelvin_bar(all->low, all->high);
+  return Error{ErrorKind::bad_input, "has no temperatures", a.result,
+               "Reconstruct it with --quantity temperature"};
+}
+
+Status render(RenderArguments a, const Verb& verb) try {
   EMBERLOCK_ASSIGN_OR_RETURN(const ImageSize size, parse_image_size(a.image));
   EMBERLOCK_RETURN_IF_ERROR(check_used(a, verb));
   EMBERLOCK_RETURN_IF_ERROR(check(a, size));
@@ -250,32 +281,41 @@ Status render(const RenderArguments& a, const Verb& verb) try {
   EMBERLOCK_ASSIGN_OR_RETURN(compute.device, recon::parse_device(a.device));
   EMBERLOCK_ASSIGN_OR_RETURN(compute.device, recon::resolve(compute.device));
   compute.threads = a.threads;
-  EMBERLOCK_ASSIGN_OR_RETURN(recon::ShownVolume shown, shown_volume(a, compute));
-  const bool told = std::any_of(shown.kelvin.begin(), shown.kelvin.end(), [](float t) { return t > 0; });
-  if (a.kelvin() && !told)
-    return Error{ErrorKind::bad_input, "tells no temperature", a.result,
-                 "Reconstruct it with --quantity temperature"};
+  EMBERLOCK_ASSIGN_OR_RETURN(const std::vector<ResultVolume> volumes, volumes_of(a.result));
+  warn_of_missing(missing_frames(a.result, volumes));
+  const fs::path& first = volumes.front().file;
+  if (is_sequence(a.result) && !verb.is_given("--frames")) a.frames = static_cast<int>(volumes.size());
+  EMBERLOCK_ASSIGN_OR_RETURN(recon::ShownVolume shown, shown_volume(a, first, compute));
+  recon::BarEnds ends{};
+  if (a.kelvin()) {
+    EMBERLOCK_ASSIGN_OR_RETURN(ends, ends_of(a, volumes));
+  }
   const recon::Box box = recon::box_of(shown.volume.grid);
-  EMBERLOCK_ASSIGN_OR_RETURN(const std::optional<Filmed> filmed, filmed_by(a, box));
+  EMBERLOCK_ASSIGN_OR_RETURN(const std::optional<Filmed> filmed, filmed_by(a, first, box));
   OutputRequest request{a.out, kRender, {a.result}};
   if (filmed)
     for (const fs::path& file : recon::files_of(filmed->input, filmed->options))
       request.inputs.push_back(file);
   EMBERLOCK_RETURN_IF_ERROR(OutputFolder::check(request));
-  EMBERLOCK_ASSIGN_OR_RETURN(const std::vector<recon::CameraModel> path, cameras_of(a, box, filmed, size));
-  const recon::BarEnds middle = recon::middle_by_light(shown.kelvin, shown.volume.emission);
-  const recon::BarEnds ends = recon::kelvin_bar(middle.low, middle.high);
+  EMBERLOCK_ASSIGN_OR_RETURN(std::vector<recon::CameraModel> path, cameras_of(a, first, box, filmed, size));
+  if (!a.camera.empty()) path.resize(volumes.size(), path.front());
   EMBERLOCK_ASSIGN_OR_RETURN(OutputFolder folder, OutputFolder::create(request));
   EMBERLOCK_ASSIGN_OR_RETURN(FrameFiles files, FrameFiles::create(a.format, folder.path(), "render", size));
   const recon::Lighting lighting = shown.lighting;
-  const RenderSome render_some =
-      a.kelvin() ? temperatures(a, shown, path, ends, compute) : colours(a, std::move(shown), compute);
-  EMBERLOCK_RETURN_IF_ERROR(render_all(a, render_some, path, files));
+  const RenderOf render_of = [&](std::size_t volume) -> Result<RenderSome> {
+    if (volume > 0) {
+      EMBERLOCK_ASSIGN_OR_RETURN(shown, shown_volume(a, volumes[volume].file, compute));
+    }
+    return a.kelvin() ? temperatures(a, shown, path, ends, compute) : colours(a, std::move(shown), compute);
+  };
+  EMBERLOCK_RETURN_IF_ERROR(render_all(a, render_of, volumes.size(), path, files));
   EMBERLOCK_RETURN_IF_ERROR(folder.commit());
-  std::printf("%-16s %zu of %d x %d\n", "frames", path.size(), size.width, size.height);
+  std::printf("%-16s %zu of %d x %d", "frames", path.size(), size.width, size.height);
+  if (volumes.size() > 1) std::printf(", of %zu volumes", volumes.size());
+  std::printf("\n");
   if (a.kelvin())
-    std::printf("%-16s %.0f K is dark, %.0f K bright (inferno); black tells nothing\n", "colours", ends.low,
-                ends.high);
+    std::printf("%-16s %.0f K is dark, %.0f K bright (inferno); black has no temperature\n", "colours",
+                ends.low, ends.high);
   else
     print_lighting(lighting);
   std::printf("%-16s %s\n", "written to", a.out.c_str());
@@ -291,14 +331,18 @@ void add_path_options(const Verb& verb, RenderArguments& a) {
       verb.add_option("--path", a.path, "orbit: once around the middle; cameras: through those that filmed")
           .check_choices({"orbit", "cameras"})
           .show_default();
-  verb.add_option("--camera", a.camera, "x,y,z (m): one picture from there").set_type("TEXT").exclude(path);
+  verb.add_option("--camera", a.camera, "x,y,z (m): one picture from there; of a sequence one of each volume")
+      .set_type("TEXT")
+      .exclude(path);
   verb.add_option("--look-at", a.look_at,
                   "x,y,z (m): what cameras look at and move around [the box's middle]")
       .set_type("TEXT");
   verb.add_option("--input", a.input,
                   "Session or transforms.json whose cameras --path cameras follows [what was reconstructed]");
   verb.add_option("--rig", a.rig, "rig.json that stands before a session's own calibration");
-  verb.add_option("--frames", a.frames, "Along the path").check_range(1, 100000).show_default();
+  verb.add_option("--frames", a.frames,
+                  "Pictures along the path, on which a sequence passes once [96; of a sequence its volumes]")
+      .check_range(1, 100000);
   verb.add_option("--elevation", a.elevation_degrees, "Of an orbit, degrees above the horizon")
       .show_default();
   verb.add_option("--distance", a.distance, "Of an orbit, m [as far as the whole box just fits]");
@@ -314,7 +358,8 @@ void add_render(const Verb& app) {
   RenderArguments& a = *arguments;
   const Verb verb = app.add_verb(
       "render", "Pictures or a video of a result from any place or path, as colours or temperatures");
-  verb.add_option("RESULT", a.result, "Folder of reconstruct, or a volume.vdb").require();
+  verb.add_option("RESULT", a.result, "Folder of reconstruct, also of a sequence (--frames), or a volume.vdb")
+      .require();
   verb.add_option("--out", a.out, "Folder for frame-0000.png and so on, or for the video").require();
   add_path_options(verb, a);
   verb.add_option("--image", a.image, "Size of the pictures").show_default();

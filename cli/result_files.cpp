@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <charconv>
+#include <cstdio>
 #include <iterator>
 #include <numeric>
 #include <string_view>
@@ -87,6 +88,18 @@ std::string numbers_in_words(std::span<const std::uint64_t> numbers) {
     i = end;
   }
   return words;
+}
+
+bool is_sequence(const fs::path& result) {
+  std::error_code ec;
+  return fs::is_directory(result, ec) && !fs::is_regular_file(result / "volume.vdb", ec);
+}
+
+void warn_of_missing(std::span<const std::uint64_t> missing) {
+  if (missing.empty()) return;
+  const bool one = missing.size() == 1;
+  std::fprintf(stderr, "%-16s %s %s %s missing\n", "warning", one ? "frame" : "frames",
+               numbers_in_words(missing).c_str(), one ? "is" : "are");
 }
 
 Result<std::vector<ResultVolume>> volumes_of(const fs::path& result) {

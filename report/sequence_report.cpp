@@ -41,7 +41,8 @@ Json json_of(const SequenceFrame& f) {
           {"ssim", number(f.ssim)},
           {"light", f.light},
           {"flicker", flicker},
-          {"time_s", number(f.time ? std::optional(f.time->value()) : std::nullopt)}};
+          {"time_s", number(f.time ? std::optional(f.time->value()) : std::nullopt)},
+          {"volume", f.volume.empty() ? Json(nullptr) : Json(f.volume)}};
 }
 
 SequenceFrame frame_of(const Json& json) {
@@ -63,6 +64,7 @@ SequenceFrame frame_of(const Json& json) {
   if (const Json& flicker = json.at("flicker"); !flicker.is_null())
     f.flicker = recon::Flicker{flicker.at("pictures").get<double>(), flicker.at("renders").get<double>()};
   if (const Json& time = json.at("time_s"); !time.is_null()) f.time = Seconds(time.get<double>());
+  if (json.contains("volume") && !json["volume"].is_null()) f.volume = json["volume"].get<std::string>();
   return f;
 }
 
@@ -107,9 +109,13 @@ std::string field(const std::optional<double>& value) { return value ? fmt::form
 std::string sequence_json(const SequenceTold& told) {
   Json frames = Json::array();
   for (const SequenceFrame& f : told.frames) frames.push_back(json_of(f));
-  const Json json = {{"format", "emberlock sequence"}, {"version", 1},
-                     {"voxels", told.voxels},          {"held_out", told.held_out},
-                     {"instants", told.instants},      {"frames", frames}};
+  Json json = {{"format", "emberlock sequence"}, {"version", 1},
+               {"voxels", told.voxels},          {"held_out", told.held_out},
+               {"instants", told.instants},      {"frames", frames}};
+  if (!told.session.empty()) {
+    json["session"] = told.session;
+    json["options"] = told.options;
+  }
   return json.dump(1, ' ', false, Json::error_handler_t::replace) + "\n";  // of paths that are no UTF-8
 }
 
@@ -122,6 +128,8 @@ Result<SequenceTold> parse_sequence(std::string_view text, const std::string& wh
   told.voxels = json.at("voxels").get<int>();
   told.held_out = json.at("held_out").get<bool>();
   told.instants = json.value("instants", 1);
+  told.session = json.value("session", "");
+  if (json.contains("options")) json["options"].get_to(told.options);
   for (const Json& frame : json.at("frames")) told.frames.push_back(frame_of(frame));
   return told;
 } catch (const std::exception& e) {

@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <functional>
+#include <map>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -30,6 +31,7 @@ struct SequenceFrame {
   double light = 0;  ///< the emission's integral over the volume, mean of the channels, grey levels m2
   std::optional<recon::Flicker> flicker = {};  ///< from the frame before
   std::optional<Seconds> time = {};            ///< after the recording's first frame
+  std::string volume = {};                     ///< SHA-256 of its volume.vdb; empty: not known
 };
 
 /// All frames that were tried, in their order.
@@ -38,12 +40,15 @@ struct SequenceTold {
   bool held_out = false;
   int instants = 1;  ///< that are counted a frame period: frame n is number n * instants
   std::vector<SequenceFrame> frames = {};
+  /// What the frames were made of and with, so that no other frames follow; empty where it isn't known.
+  std::string session = {};
+  std::map<std::string, std::string> options = {};  ///< that were given
 };
 
 /// frames.json: {"format": "emberlock sequence", "version": 1, "voxels", "held_out", "instants", "frames":
 /// [{"frame", "error" (null where there is a volume), "start", "decided", "iterations", "seconds" {loading,
 /// reconstruction, writing}, "input_rmse", "heldout_rmse", "psnr", "ssim", "light", "flicker" {pictures,
-/// renders}, "time_s"}]}; null is what isn't known.
+/// renders}, "time_s", "volume" (SHA-256)}], "session", "options": {name: value}}; null is what isn't known.
 std::string sequence_json(const SequenceTold& told);
 /// The reverse. `where` is named in errors (bad_input).
 Result<SequenceTold> parse_sequence(std::string_view json, const std::string& where);

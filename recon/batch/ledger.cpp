@@ -68,12 +68,17 @@ std::pair<std::string, std::string> parts_of(const std::string& name) {
   return {name.substr(0, dot), name.substr(dot + 1)};
 }
 
-Status fill(const fs::path& folder, const std::string& plan, const std::vector<std::string>& chunks) {
+Status make_folders(const fs::path& folder) {
   std::error_code ec;
   for (const char* part : {"", "todo", "claims", "work", "partial", "done", "lost", "given_up", "workers"}) {
     fs::create_directory(folder / part, ec);
     if (ec) return io_error("can't be created", folder / part, ec.value());
   }
+  return {};
+}
+
+Status fill(const fs::path& folder, const std::string& plan, const std::vector<std::string>& chunks) {
+  EMBERLOCK_RETURN_IF_ERROR(make_folders(folder));
   EMBERLOCK_RETURN_IF_ERROR(write_file_atomically(folder / kPlan, plan));
   for (const std::string& chunk : chunks) {
     EMBERLOCK_RETURN_IF_ERROR(put_empty_file(folder / "todo" / chunk));
@@ -218,6 +223,24 @@ Status Ledger::reopen(const std::string& chunk) {
   fs::remove_all(folder_ / "partial" / chunk, ec);  // of an attempt that came second
   fs::remove(folder_ / "given_up" / chunk, ec);     // before one that was taken for dead had done it
   return give_back({chunk, folder_ / "work" / mine(chunk)});
+}
+
+Status Ledger::restore_folders() const { return make_folders(folder_); }
+
+Result<std::vector<std::string>> Ledger::restore_missing() const {
+  EMBERLOCK_RETURN_IF_ERROR(restore_folders());
+  std::set<std::string> found;
+  // Claims twice, as a chunk may move to todo and back meanwhile. One that is missed all the same is done
+  // twice, which harms nothing.
+  for (const char* where : {"claims", "todo", "claims", "done", "given_up"})
+    for (const std::string& name : names_in(folder_ / where)) found.insert(parts_of(name).first);
+  std::vector<std::string> missing;
+  for (const std::string& chunk : chunks_) {
+    if (found.contains(chunk)) continue;
+    EMBERLOCK_RETURN_IF_ERROR(put_empty_file(folder_ / "todo" / chunk));
+    missing.push_back(chunk);
+  }
+  return missing;
 }
 
 bool Ledger::done(const std::string& chunk) const {

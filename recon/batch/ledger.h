@@ -70,6 +70,11 @@ class Ledger {
   /// one did so before. Not while others finish it. Error: io.
   Status reopen(const std::string& chunk);
 
+  /// Makes those of the ledger's folders that are missing, as in a copy without empty folders. Error: io.
+  [[nodiscard]] Status restore_folders() const;
+  /// Puts each chunk that lies nowhere, as its result was removed, into todo; returns those. Error: io.
+  [[nodiscard]] Result<std::vector<std::string>> restore_missing() const;
+
   [[nodiscard]] bool done(const std::string& chunk) const;
   [[nodiscard]] bool given_up(const std::string& chunk) const;
   /// Whether each chunk is done or given up.

@@ -75,6 +75,17 @@ Result<BatchPlan> parse_plan(std::string_view text, const std::string& where) tr
   return Error{ErrorKind::bad_input, e.what(), where, "Give another --out"};
 }
 
+std::string other_option(const std::map<std::string, std::string>& before,
+                         const std::map<std::string, std::string>& now) {
+  std::set<std::string> names;
+  for (const auto& options : {before, now})
+    for (const auto& [name, value] : options) names.insert(name);
+  for (const std::string& name : names)
+    if (given(before, name) != given(now, name))
+      return fmt::format("{} was {}, and is {}", name, given(before, name), given(now, name));
+  return {};
+}
+
 Status same_run(const BatchPlan& planned, const BatchPlan& asked, const std::string& where) {
   const auto differs = [&](std::string what) -> Status {
     return Error{ErrorKind::bad_input, std::move(what), where,
@@ -87,14 +98,8 @@ Status same_run(const BatchPlan& planned, const BatchPlan& asked, const std::str
         fmt::format("holds a batch of frames {}, not {}", range_of(planned.frames), range_of(asked.frames)));
   if (asked.chunk != 0 && planned.chunk != asked.chunk)
     return differs(fmt::format("holds a batch in chunks of {} frames, not {}", planned.chunk, asked.chunk));
-  std::set<std::string> names;
-  for (const auto& options : {planned.options, asked.options})
-    for (const auto& [name, value] : options) names.insert(name);
-  for (const std::string& name : names)
-    if (given(planned.options, name) != given(asked.options, name))
-      return differs(fmt::format("holds a batch of other options: {} was {}, and is {}", name,
-                                 given(planned.options, name), given(asked.options, name)));
-  return {};
+  const std::string other = other_option(planned.options, asked.options);
+  return other.empty() ? Status() : differs("holds a batch of other options: " + other);
 }
 
 }  // namespace emberlock::recon

@@ -35,6 +35,10 @@ std::string to_json(const BatchPlan& plan);
 /// The reverse. `where` is named in errors (bad_input).
 Result<BatchPlan> parse_plan(std::string_view json, const std::string& where);
 
+/// The first option that was given otherwise: "--voxels was "16", and is "24""; empty where none was.
+std::string other_option(const std::map<std::string, std::string>& before,
+                         const std::map<std::string, std::string>& now);
+
 /// Whether a run that is `asked` for goes on with what is planned. Its chunk counts where it isn't 0, its
 /// voxels only as an option. Error (bad_input): the first difference.
 Status same_run(const BatchPlan& planned, const BatchPlan& asked, const std::string& where);

@@ -19,7 +19,8 @@ Error not_a_volume(const std::filesystem::path& path, std::string what) {
 }
 
 /// The first or last bytes; fewer where the file has fewer.
-std::string part_of_file(std::ifstream& file, std::streamoff size, std::streamoff from, std::streamoff count) {
+std::string part_of_file(std::ifstream& file, std::streamoff size, std::streamoff from,
+                         std::streamoff count) {
   from = std::max<std::streamoff>(from, 0);
   std::string bytes(static_cast<std::size_t>(std::clamp<std::streamoff>(size - from, 0, count)), '\0');
   file.seekg(from);

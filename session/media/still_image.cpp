@@ -16,6 +16,26 @@
 namespace emberlock::session {
 namespace {
 
+/// A kind of picture that isn't read, by its magic number.
+Error not_read(std::string_view s, const std::string& where) {
+  const std::string_view brand = s.size() >= 12 && s.substr(4, 4) == "ftyp" ? s.substr(8, 4) : "";
+  const std::string_view kind = s.starts_with("RIFF") && s.size() >= 12 && s.substr(8, 4) == "WEBP" ? "WebP"
+                                : s.starts_with("GIF8")                                             ? "GIF"
+                                : s.starts_with("BM")                                               ? "BMP"
+                                : s.starts_with("\xabKTX")                                          ? "KTX"
+                                : s.starts_with("DDS ")                                             ? "DDS"
+                                : s.starts_with("8BPS")                       ? "Photoshop"
+                                : s.starts_with("#?RADIANCE")                 ? "Radiance"
+                                : s.starts_with("\x76\x2f\x31\x01")           ? "OpenEXR"
+                                : brand.starts_with("avi")                    ? "AVIF"
+                                : brand.starts_with("hei") || brand == "mif1" ? "HEIF"
+                                                                              : "";
+  return {ErrorKind::bad_input,
+          kind.empty() ? "isn't a picture (known are PGM, PPM, PNG, JPEG, TIFF and FITS)"
+                       : "a " + std::string(kind) + " picture, which isn't read",
+          where, "Convert it to PNG or JPEG"};
+}
+
 Error truncated(const std::string& where, std::string_view kind) {
   return {ErrorKind::bad_input, "the " + std::string(kind) + " is truncated", where,
           "Copy or record it again"};
@@ -143,6 +163,7 @@ Result<ImageSize> picture_size(std::string_view content, const std::string& wher
 }
 
 Result<Image> decode_still_image(std::string_view content, const std::string& where, Alpha alpha) {
+  if (!is_still_image(content)) return not_read(content, where);
   EMBERLOCK_ASSIGN_OR_RETURN(const StillContents found, examine_still(content, where));
   std::string file(content);
   return decode_picture(file, found.pictures.front(), where, alpha);

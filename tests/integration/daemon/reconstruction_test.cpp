@@ -249,7 +249,7 @@ TEST_F(FramesInTurnSlow, ASequenceThatWasInterruptedEndsAsIfItHadNotBeen) {
   EXPECT_EQ(run("0:1", "other").status, 0);
   const Shell others = run("0:2", "other", "--hold-out 10 --effects extinction=30");
   EXPECT_EQ(others.status, 2);
-  EXPECT_THAT(others.output, HasSubstr("frame 0, done again, is not what it was"));
+  EXPECT_THAT(others.output, HasSubstr(R"(--effects was not given, and is "extinction=30")"));
   EXPECT_THAT(run("1:2", "other").output, HasSubstr("holds a sequence of other frames"));
 }
 

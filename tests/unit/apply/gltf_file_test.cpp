@@ -1,11 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "apply/gltf_file.h"
 
+#include <algorithm>
+#include <array>
 #include <fstream>
 #include <limits>
+#include <utility>
+#include <vector>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sys/stat.h>
 
 #include "base/file.h"
 #include "tests/support/gltf_writer.h"
@@ -211,8 +216,6 @@ TEST_F(GltfFileTest, RefusesWhatItCannotShow) {
                     "extensionsRequired": ["KHR_draco_mesh_compression"])";
   expect_refused(gltf.text(), "KHR_draco_mesh_compression");
   gltf = {};
-  gltf.primitive = R"("material": 0, "mode": 5)";
-  expect_refused(gltf.text(), "strips");
   gltf.primitive = R"("material": 9)";
   expect_refused(gltf.text(), "material 9 isn't there");
   gltf = {};
@@ -248,6 +251,171 @@ TEST_F(GltfFileTest, PointsAndLinesAreLeftOutAndTold) {
   ASSERT_TRUE(scene.ok()) << scene.error().message();
   EXPECT_TRUE(mesh_.triangles.empty());
   EXPECT_THAT(scene->notes, ElementsAre(HasSubstr("lines")));
+}
+
+/// What is asked for and isn't drawn, each by its name.
+TEST_F(GltfFileTest, WhatIsNotDrawnIsNamed) {
+  struct Row {
+    std::string further, nodes, words;
+  };
+  const std::string one = R"([{"mesh": 0}])";
+  std::vector<Row> rows;
+  for (const char* name : {"KHR_materials_pbrSpecularGlossiness", "KHR_materials_transmission",
+                           "KHR_materials_unlit", "KHR_materials_volume", "KHR_materials_clearcoat",
+                           "KHR_materials_sheen", "KHR_materials_ior", "KHR_materials_specular",
+                           "KHR_materials_iridescence", "KHR_materials_variants", "VENDOR_materials_new"}) {
+    const std::string used = std::string(R"("extensions": {")") + name + R"(": {}})";
+    rows.push_back({R"("materials": [{)" + used + "}]", one, name});
+    rows.push_back({std::string(R"("materials": [{}], "extensionsUsed": [")") + name + R"("])", one, name});
+  }
+  for (const char* name : {"EXT_mesh_gpu_instancing", "MSFT_lod", "KHR_node_visibility"})
+    rows.push_back({R"("materials": [{}])",
+                    std::string(R"([{"mesh": 0, "extensions": {")") + name + R"(": {}}}])", name});
+  rows.push_back({R"("materials": [{"pbrMetallicRoughness": {"metallicFactor": 1, "roughnessFactor": 0.5}}])",
+                  one, "metal"});
+  rows.push_back({R"("materials": [{"alphaMode": "MASK"}])", one, "opaque"});
+  rows.push_back({R"("materials": [{}], "cameras": [{"type": "orthographic", "orthographic":
+                  {"xmag": 1, "ymag": 1, "zfar": 9, "znear": 1}}])",
+                  R"([{"mesh": 0, "camera": 0}])", "orthographic"});
+  for (const Row& row : rows) {
+    GltfText gltf;
+    gltf.further = row.further;
+    gltf.nodes = row.nodes;
+    const auto scene = read(gltf.text());
+    ASSERT_TRUE(scene.ok()) << row.words << ": " << scene.error().message();
+    EXPECT_THAT(scene->notes, ElementsAre(HasSubstr(row.words))) << row.further;
+  }
+  GltfText gltf;  // what adds nothing to a picture needs no word, and neither do extras
+  gltf.further = R"("materials": [{"extensions": {"KHR_materials_emissive_strength": {}},
+                   "extras": {"extensions": {"X": 1}}}], "extensionsUsed": ["KHR_xmp", "KHR_mesh_quantization"])";
+  EXPECT_TRUE(read(gltf.text()).value().notes.empty());
+}
+
+TEST_F(GltfFileTest, MorphWeightsAreNamedWhereTheyAreNotZero) {
+  for (const auto& [nodes, named] : {std::pair(R"([{"mesh": 0, "weights": [0.5]}])", true),
+                                     {R"([{"mesh": 0, "weights": [0]}])", false},
+                                     {R"([{"mesh": 0}])", false}}) {
+    GltfText gltf;
+    gltf.nodes = nodes;
+    gltf.primitive = R"("material": 0, "targets": [{"POSITION": 0}])";
+    const auto scene = read(gltf.text());
+    ASSERT_TRUE(scene.ok()) << scene.error().message();
+    EXPECT_EQ(scene->notes.size(), named ? 1U : 0U) << nodes;
+    if (named) EXPECT_THAT(scene->notes[0], HasSubstr("morph weights"));
+  }
+}
+
+/// Strips and fans of any length are the single triangles of the same corners.
+TEST_F(GltfFileTest, StripsAndFansAreTheirTriangles) {
+  using Triangle = std::array<std::uint32_t, 3>;
+  for (const int mode : {5, 6})
+    for (std::size_t n = 0; n < 10; ++n) {
+      GltfText gltf;
+      gltf.corners.clear();
+      gltf.indices.clear();
+      std::vector<Triangle> expected;
+      for (std::size_t i = 0; i < std::max<std::size_t>(n, 3); ++i)
+        gltf.corners.insert(gltf.corners.end(), {static_cast<float>(i), static_cast<float>(i * i), 0});
+      for (std::size_t i = 0; i < n; ++i) gltf.indices.push_back(static_cast<std::uint16_t>(i));
+      for (std::uint32_t i = 2; i < n; ++i) expected.push_back({mode == 5 ? i - 2 : 0, i - 1, i});
+      gltf.primitive = R"("material": 0, "mode": )" + std::to_string(mode);
+      const auto scene = read(gltf.text());
+      ASSERT_TRUE(scene.ok() || n == 0) << scene.error().message();
+      EXPECT_EQ(mesh_.triangles, expected) << mode << ' ' << n;
+    }
+}
+
+/// One triangle whose corners are sparse, over a buffer or over nothing, is where a plain one is.
+TEST_F(GltfFileTest, SparseCornersReplaceTheOthers) {
+  const auto text = [](bool over_buffer, int count, int index) {
+    GltfText gltf;
+    gltf.corners = {0, 0, 0, 1, 0, 0, 0, 0, -1, 5, 6, 7};  // the last one is the sparse value
+    gltf.attributes = R"("POSITION": 2)";
+    gltf.indices = {0, 1, 2, static_cast<std::uint16_t>(index)};
+    gltf.accessors = std::string(R"(, {"componentType": 5126, "type": "VEC3", "count": 3, )") +
+                     (over_buffer ? R"("bufferView": 0, )" : "") + R"("sparse": {"count": )" +
+                     std::to_string(count) +
+                     R"(, "indices": {"bufferView": 1, "byteOffset": 6, "componentType": 5123},
+                        "values": {"bufferView": 0, "byteOffset": 36}}})";
+    return gltf.text();
+  };
+  for (const bool over_buffer : {true, false})
+    for (std::size_t index = 0; index < 3; ++index) {
+      const auto scene = read(text(over_buffer, 1, static_cast<int>(index)));
+      ASSERT_TRUE(scene.ok()) << scene.error().message();
+      ASSERT_EQ(mesh_.triangles.size(), 1U);
+      for (std::size_t i = 0; i < 3; ++i) {
+        if (i == index) expect_vertex(i, 5, -7, 6);
+        if (i != index && !over_buffer) expect_vertex(i, 0, 0, 0);
+        if (i != index && over_buffer) expect_vertex(i, i == 1 ? 1.0F : 0.0F, i == 2 ? 1.0F : 0.0F, 0);
+      }
+    }
+  expect_refused(text(true, 1, 3), "index is out of range");
+  expect_refused(text(true, 2, 1), "goes beyond its buffer");
+  expect_refused(text(true, 9, 1), "is out of range");
+}
+
+/// Corners of integers, normalised or not (KHR_mesh_quantization).
+TEST_F(GltfFileTest, QuantisedCornersAreTheirShares) {
+  struct Kind {
+    int type;
+    std::size_t bytes;
+    double most;
+  };
+  for (const Kind kind : {Kind{5120, 1, 127}, {5121, 1, 255}, {5122, 2, 32767}, {5123, 2, 65535}})
+    for (const bool normalised : {true, false}) {
+      GltfText gltf;
+      gltf.corners.assign(6, 0.0F);  // 24 bytes: three corners of four components
+      const std::size_t step = 4 * kind.bytes;
+      auto* const bytes = reinterpret_cast<unsigned char*>(gltf.corners.data());
+      bytes[step] = 100;  // x of the second corner, low byte
+      gltf.attributes = R"("POSITION": 2)";
+      gltf.accessors = R"(, {"bufferView": 2, "componentType": )" + std::to_string(kind.type) +
+                       R"(, "type": "VEC3", "count": 3, "normalized": )" + (normalised ? "true" : "false") +
+                       "}";
+      std::string text = gltf.text();
+      const std::string views = R"("bufferViews": [)";
+      const std::size_t end = text.find(']', text.find(views));
+      text.insert(end, R"(, {"buffer": 0, "byteLength": 24, "byteStride": )" + std::to_string(step) + "}");
+      const auto scene = read(text);
+      ASSERT_TRUE(scene.ok()) << scene.error().message();
+      expect_vertex(0, 0, 0, 0);
+      expect_vertex(1, static_cast<float>(normalised ? 100 / kind.most : 100), 0, 0);
+    }
+}
+
+TEST_F(GltfFileTest, APictureOfAnotherKindIsNamed) {
+  for (const auto& [bytes, kind] :
+       std::vector<std::pair<std::string, std::string>>{{std::string("RIFF\4\0\0\0WEBP", 12), "WebP"},
+                                                        {"GIF89a", "GIF"},
+                                                        {"GIF87a", "GIF"},
+                                                        {"BM1234", "BMP"},
+                                                        {"DDS |", "DDS"},
+                                                        {"\xabKTX 20", "KTX"},
+                                                        {"8BPS", "Photoshop"},
+                                                        {"#?RADIANCE", "Radiance"},
+                                                        {std::string("\0\0\0\x1c", 4) + "ftypavif", "AVIF"},
+                                                        {std::string("\0\0\0\x1c", 4) + "ftypheic", "HEIF"},
+                                                        {"text", "isn't a picture"}}) {
+    GltfText gltf;
+    gltf.further = R"("materials": [{"pbrMetallicRoughness": {"baseColorTexture": {"index": 0}}}],
+      "textures": [{"source": 0}], "images": [{"uri": "data:image/png;base64,)" +
+                   test::base64(bytes) + R"("}])";
+    expect_refused(gltf.text(), kind);
+  }
+}
+
+/// A pipe as a buffer or a picture doesn't keep the reader waiting.
+TEST_F(GltfFileTest, PipesAreRefused) {
+  ASSERT_EQ(::mkfifo((temp_ / "pipe").c_str(), 0600), 0);
+  GltfText gltf;
+  gltf.uri = "pipe";
+  expect_refused(gltf.text(), "pipe");
+  gltf = {};
+  gltf.further = R"("materials": [{"pbrMetallicRoughness": {"baseColorTexture": {"index": 0}}}],
+      "textures": [{"source": 0}], "images": [{"uri": "pipe"}])";
+  expect_refused(gltf.text(), "pipe");
+  EXPECT_FALSE(read_gltf(temp_ / "pipe", {}, mesh_).ok());
 }
 
 }  // namespace

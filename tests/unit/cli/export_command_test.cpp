@@ -146,7 +146,7 @@ TEST_F(ExportCommandTest, RefusesWhatIsNoResult) {
   expect_refused(run("pictures"), "has no volume.vdb");
   expect_refused(run("nothing"), "isn't there");
   std::ofstream(folder_ / "text.vdb") << "no volume";
-  expect_refused(run("text.vdb"), "text.vdb: is cut short");
+  expect_refused(run("text.vdb"), "text.vdb: isn't an OpenVDB file");
   expect_refused(run("empty"), "is empty");
   expect_refused(run("sequence/frame-4", {"--grids", "temperature"}), "--quantity temperature");
   expect_refused(run("hot", {"--grids", "heat"}), "has no heat, only density, emission, temperature, flame");

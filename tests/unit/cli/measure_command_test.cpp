@@ -165,5 +165,17 @@ TEST_F(MeasureCommandTest, SaysWhatIsMissing) {
   expect_refused({(root_ / "a.vdb").string(), "--target-sphere", "0, 0, 0.05, 0.06"}, "cuts the flame");
 }
 
+TEST_F(MeasureCommandTest, ASequencesFolderStandsForItsFrames) {
+  for (const char* frame : {"flames/frame-3", "flames/frame-12"}) {
+    fs::create_directories(root_ / frame);
+    write(std::string(frame) + "/volume.vdb", true);
+  }
+  const auto result = run({(root_ / "flames").string()});
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  const std::size_t first = result.out.find("flames/frame-3\n");
+  ASSERT_NE(first, std::string::npos) << result.out;
+  EXPECT_NE(result.out.find("flames/frame-12\n", first), std::string::npos) << result.out;
+}
+
 }  // namespace
 }  // namespace emberlock::cli

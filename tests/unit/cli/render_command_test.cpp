@@ -7,6 +7,7 @@
 
 #include <OpenEXR/ImfFrameBuffer.h>
 #include <OpenEXR/ImfInputFile.h>
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <opencv2/imgcodecs.hpp>
 
@@ -161,7 +162,7 @@ TEST_F(RenderCommandTest, TemperaturesSayWhatTheirColoursMean) {
   fs::remove_all(out_);
   const auto none = test::run_verb(add_render, {"render", (folder_ / "colours.vdb").string(), "--out",
                                                 out_.string(), "--quantity", "temperature"});
-  expect_refused(none, "tells no temperature");
+  expect_refused(none, "has no temperatures");
 }
 
 TEST_F(RenderCommandTest, ALosslessVideoHasThePicturesBits) {
@@ -253,6 +254,39 @@ TEST_F(RenderCommandTest, RefusesWhatCannotBeShown) {
   expect_refused(test::run_verb(add_render, {"render", (folder_ / "result").string(), "--out", out_.string(),
                                              "--format", "mp4", "--image", "65x48"}),
                  "even sides");
+}
+
+/// A sequence passes once while the camera stands or moves: its brightness tells which volume a picture
+/// shows.
+TEST_F(RenderCommandTest, ASequencePassesOnceAlongThePath) {
+  const auto one = recon::read_volume(folder_ / "colours.vdb");
+  ASSERT_TRUE(one.ok());
+  const fs::path sequence = folder_ / "sequence";
+  for (const int frame : {2, 4, 10}) {
+    recon::Volume volume = *one;
+    for (float& v : volume.emission) v *= static_cast<float>(frame) / 10;
+    fs::create_directories(sequence / fmt::format("frame-{}", frame));
+    ASSERT_TRUE(recon::write_volume(volume, sequence / fmt::format("frame-{}/volume.vdb", frame)).ok());
+  }
+  const auto reds = [&](const std::vector<std::string>& words) {
+    std::vector<std::string> all{"render",  sequence.string(), "--out",    out_.string(),
+                                 "--image", "64x48",           "--device", "cpu"};
+    all.insert(all.end(), words.begin(), words.end());
+    const auto result = test::run_verb(add_render, all);
+    EXPECT_EQ(result.exit_code, 0) << result.err;
+    EXPECT_THAT(result.err, HasSubstr("frames 6, 8 are missing"));
+    std::vector<int> shares;
+    for (int i = 0; fs::exists(out_ / fmt::format("frame-{:04}.png", i)); ++i)
+      shares.push_back(picture(fmt::format("frame-{:04}.png", i)).at<cv::Vec3b>(24, 32)[2]);
+    for (int& share : shares)
+      share = shares.empty() ? 0 : static_cast<int>(10.0 * share / shares.back() + 0.5);
+    return shares;
+  };
+  using testing::ElementsAre;
+  EXPECT_THAT(reds({"--brightness", "0.5"}), ElementsAre(2, 4, 10));
+  EXPECT_THAT(reds({"--brightness", "0.5", "--camera", "0.5,0,0"}), ElementsAre(2, 4, 10));
+  EXPECT_THAT(reds({"--brightness", "0.5", "--frames", "7"}), ElementsAre(2, 2, 2, 4, 4, 10, 10));
+  EXPECT_THAT(reds({"--brightness", "0.5", "--frames", "1"}), ElementsAre(10)) << "of itself";
 }
 
 }  // namespace

@@ -309,5 +309,37 @@ TEST_F(LedgerOfTwo, AFolderThatCantBeWrittenToIsAnError) {
   EXPECT_TRUE(fs::exists(folder_ / "todo" / "a")) << "the chunk is nobody's";
 }
 
+/// Whatever of the results is removed is done again, and nothing else is.
+TEST(LedgerRestore, AResultThatWasRemovedIsDoneAgain) {
+  const std::vector<std::string> chunks{"a", "b", "c", "d"};
+  for (unsigned removed = 0; removed < 16; ++removed) {
+    const TempFolder temp;
+    const fs::path folder = temp / "ledger";
+    ASSERT_TRUE(Ledger::create(folder, "w", "plan", chunks).ok());
+    Ledger ledger(folder, chunks, "w");
+    for (std::size_t i = 0; i < chunks.size(); ++i) {
+      const auto claim = ledger.take(kAllLive);
+      ASSERT_TRUE(claim.ok() && *claim);
+      ASSERT_TRUE(ledger.finish(**claim).ok());
+    }
+    ASSERT_TRUE(ledger.settled());
+    std::vector<std::string> expected;
+    for (std::size_t i = 0; i < chunks.size(); ++i)
+      if ((removed >> i & 1U) != 0) expected.push_back(chunks[i]);
+    for (const std::string& chunk : expected) fs::remove_all(ledger.result(chunk));
+    if (removed == 15)  // with all folders, as in a copy without empty ones
+      for (const char* part : {"todo", "claims", "work", "partial", "done", "lost", "given_up", "workers"})
+        fs::remove_all(folder / part);
+    EXPECT_EQ(ledger.restore_missing().value(), expected);
+    EXPECT_TRUE(ledger.restore_missing().value().empty());
+    for (std::size_t i = 0; i < expected.size(); ++i) {
+      const auto claim = ledger.take(kAllLive);
+      ASSERT_TRUE(claim.ok() && *claim);
+      EXPECT_TRUE(ledger.finish(**claim).value());
+    }
+    EXPECT_TRUE(ledger.settled());
+  }
+}
+
 }  // namespace
 }  // namespace emberlock::recon

@@ -173,7 +173,8 @@ constexpr double kRefusalRate = 20;
 
 /// Pushes frames of so many seconds, and waits until each has been tried.
 void push_seconds(AsyncWriter& writer, double seconds, std::uint64_t& pushed) {
-  for (const auto end = pushed + static_cast<std::uint64_t>(std::llround(seconds * kRefusalRate)); pushed < end; ++pushed) {
+  for (const auto end = pushed + static_cast<std::uint64_t>(std::llround(seconds * kRefusalRate));
+       pushed < end; ++pushed) {
     Frame frame = noise_frame({{32, 24}, PixelFormat::gray8, 8}, pushed);
     frame.stamp.monotonic_time.ns =
         static_cast<std::int64_t>(1e9 + 1e9 / kRefusalRate * static_cast<double>(pushed));

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <string>
 #include <system_error>
 
@@ -29,18 +30,33 @@ Result<Scene> load_transforms(const fs::path& path, const SceneOptions& options)
   Scene scene;
   EMBERLOCK_ASSIGN_OR_RETURN(scene.response, response_of(transforms));
   scene.preprocessing = {{"all", false, "pictures of a transforms.json are taken as they are"}};
+  std::map<std::string, std::vector<std::string>> pictures_with;  // by field that isn't applied
   for (const TransformsFrame& frame : transforms.frames) {
-    auto image = session::read_image(frame.image);
+    std::vector<std::string> unapplied;
+    auto image = session::read_image(frame.image, &unapplied);
     if (!image) {
       return Error{image.error().kind, image.error().message(), frame.where + ".file_path",
                    "Correct file_path, or bring the picture there"};
     }
     View view;
     view.name = frame.image.filename().string();
-    EMBERLOCK_ASSIGN_OR_RETURN(view.camera.intrinsics, intrinsics_of(frame, image->layout().size));
+    for (const std::string& field : unapplied) pictures_with[field].push_back(view.name);
+    Result<Intrinsics> lens = intrinsics_of(frame, image->layout().size);
+    if (!lens.ok() && !unapplied.empty()) {
+      Error error = lens.error();
+      error.remedy += ". The picture's " + unapplied.front();
+      return error;
+    }
+    EMBERLOCK_ASSIGN_OR_RETURN(view.camera.intrinsics, std::move(lens));
     view.camera.camera_from_world = frame.camera_from_world;
     view.image = share(as_filmed(share(std::move(*image))));
     scene.views.push_back(std::move(view));
+  }
+  for (const auto& [field, names] : pictures_with) {
+    const std::string more = names.size() > 1 ? " and " + std::to_string(names.size() - 1) + " more" : "";
+    scene.preprocessing.push_back(
+        {"orientation", false,
+         names.front() + more + ": " + field + ": poses and lens must be those of the stored picture"});
   }
   if (options.box || transforms.box) {
     scene.box = options.box ? *options.box : *transforms.box;

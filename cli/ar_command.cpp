@@ -179,6 +179,26 @@ OutputRequest request_of(const ArArguments& a) {
   return request;
 }
 
+/// Prints what of the film isn't in what was written.
+void print_losses(const ArArguments& a, const ArFilm& film) {
+  const auto print = [](const std::string& text) { std::printf("%-16s %s\n", "note", text.c_str()); };
+  const EvenFrames even(a.format, film.times());
+  std::size_t dropped = 0;
+  for (std::size_t f = 0; f < film.times().size(); ++f) dropped += even.repeats(f) == 0 ? 1 : 0;
+  if (dropped > 0) {
+    print(
+        fmt::format("{} of {} frames came closer than {:g} a second and aren't shown; --rate gives more room",
+                    dropped, film.times().size(), a.format.rate));
+  }
+  if (film.sound()) print("the film's sound isn't copied");
+  const bool holds_matrix = a.format.video() && session::VideoWriter::holds_matrix(a.format.coding());
+  if (film.display().matrix && !holds_matrix)
+    print("frames are as stored: the film's display matrix isn't copied, players turned it");
+  if (!film.display().square() && !a.format.video())
+    print(fmt::format("the film's pixels are {}:{}, which pictures don't state", film.display().pixel_width,
+                      film.display().pixel_height));
+}
+
 void print_done(const ArArguments& a, const ArFilm& film, const ArPoses& poses, double seconds) {
   using From = apply::TrackedPose::From;
   const auto n = static_cast<double>(poses.frames.size());
@@ -187,6 +207,7 @@ void print_done(const ArArguments& a, const ArFilm& film, const ArPoses& poses, 
   std::printf("%-16s seen in %zu, predicted in %zu, absent in %zu; residual %.2f px (RMS)\n", "marker",
               poses.count(From::marker), poses.count(From::prediction), poses.count(From::nothing),
               poses.rms());
+  print_losses(a, film);
   std::printf("%-16s %s\n", "written to", a.out.c_str());
 }
 
@@ -215,7 +236,7 @@ Status draw_ar(ArArguments a, bool rate_told) try {
   EMBERLOCK_RETURN_IF_ERROR(film.rewind());
   EMBERLOCK_ASSIGN_OR_RETURN(OutputFolder folder, OutputFolder::create(request));
   EMBERLOCK_ASSIGN_OR_RETURN(FrameFiles files,
-                             FrameFiles::create(a.format, folder.path(), "ar", film.size()));
+                             FrameFiles::create(a.format, folder.path(), "ar", film.size(), film.display()));
   apply::Composite composite(lens, marker, curve, {a.albedo, a.step});
   EMBERLOCK_RETURN_IF_ERROR(draw_frames(a, film, poses, {player, composite, front, pool}, files));
   EMBERLOCK_RETURN_IF_ERROR(write_poses(folder.path() / "poses.json", film, marker, lens, poses));

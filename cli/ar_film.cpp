@@ -23,6 +23,8 @@ Result<ArFilm> ArFilm::of_video(const std::filesystem::path& path) {
   film.name_ = path.string();
   film.path_ = path;
   film.size_ = scan.size;
+  film.display_ = scan.display;
+  film.sound_ = scan.sound;
   for (const std::int64_t ticks : scan.ticks)
     film.times_.push_back(static_cast<double>(ticks - scan.ticks.front()) * scan.tick);
   EMBERLOCK_RETURN_IF_ERROR(film.rewind());

@@ -11,6 +11,7 @@
 #include "base/quantity.h"
 #include "base/result.h"
 #include "session/media/frame_file.h"
+#include "session/video_display.h"
 
 namespace emberlock::cli {
 
@@ -26,6 +27,9 @@ class ArFilm {
   [[nodiscard]] ImageSize size() const { return size_; }
   /// Of each frame, after the first. Of a video, those that its packets promise: fewer may decode.
   [[nodiscard]] const std::vector<Seconds>& times() const { return times_; }
+  /// How players show a video's frames; they are drawn into as they are stored.
+  [[nodiscard]] const session::VideoDisplay& display() const { return display_; }
+  [[nodiscard]] bool sound() const { return sound_; }
   /// As most frames follow one another; 24 of a single one.
   [[nodiscard]] Hertz rate() const;
 
@@ -40,6 +44,8 @@ class ArFilm {
 
   std::string name_;
   ImageSize size_;
+  session::VideoDisplay display_;
+  bool sound_ = false;
   std::vector<Seconds> times_;
   std::filesystem::path path_;
   std::unique_ptr<session::FrameFile> file_;

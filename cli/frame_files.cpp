@@ -44,15 +44,15 @@ Picture picture_of(const recon::RadianceImage& light, const std::vector<float>& 
 }
 
 Result<FrameFiles> FrameFiles::create(const FrameFormat& format, const fs::path& folder,
-                                      const std::string& name, ImageSize size) {
+                                      const std::string& name, ImageSize size,
+                                      const session::VideoDisplay& display) {
   FrameFiles files(folder);
   if (!format.video()) return files;
-  using Coding = session::VideoWriter::Coding;
-  const bool lossless = format.format == "ffv1";
-  EMBERLOCK_ASSIGN_OR_RETURN(files.video_,
-                             session::VideoWriter::create(folder / (name + (lossless ? ".mkv" : ".mp4")),
-                                                          {size, PixelFormat::rgb8, 8}, Hertz(format.rate), 0,
-                                                          lossless ? Coding::lossless : Coding::for_players));
+  const session::VideoWriter::Coding coding = format.coding();
+  const char* const ending = coding == session::VideoWriter::Coding::lossless ? ".mkv" : ".mp4";
+  EMBERLOCK_ASSIGN_OR_RETURN(
+      files.video_, session::VideoWriter::create(folder / (name + ending), {size, PixelFormat::rgb8, 8},
+                                                 Hertz(format.rate), 0, coding, display));
   return files;
 }
 

@@ -25,6 +25,10 @@ struct FrameFormat {
   double rate = 24;  ///< of a video, frames a second
 
   [[nodiscard]] bool video() const { return format == "mp4" || format == "ffv1"; }
+  [[nodiscard]] session::VideoWriter::Coding coding() const {
+    using Coding = session::VideoWriter::Coding;
+    return format == "ffv1" ? Coding::lossless : Coding::for_players;
+  }
 };
 /// Error: sides, a rate or a brightness out of range; odd sides of a video for players.
 Status check_frames(const FrameFormat& format, ImageSize size, double brightness);
@@ -42,7 +46,8 @@ Picture picture_of(const recon::RadianceImage& light, const std::vector<float>& 
 class FrameFiles {
  public:
   static Result<FrameFiles> create(const FrameFormat& format, const std::filesystem::path& folder,
-                                   const std::string& name, ImageSize size);
+                                   const std::string& name, ImageSize size,
+                                   const session::VideoDisplay& display = {});
   Status put(const Picture& picture);
   /// Light as fractions of white, the opacity beside it, and further channels.
   Status put_exr(const recon::RadianceImage& light, const std::vector<float>& opacity,

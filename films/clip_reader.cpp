@@ -105,7 +105,9 @@ Result<FilmedClip> read_clip(const std::string& file, const Advanced& advanced) 
   }
   clip.reading.frames = smear::share_lamp(smear::settle(clip.reading.frames));
   clip.strips = keeper.take();
-  EMBERLOCK_ASSIGN_OR_RETURN(clip.sound, session::read_sound(file));
+  if (video->pictures() == 0) {
+    EMBERLOCK_ASSIGN_OR_RETURN(clip.sound, session::read_sound(file));
+  }
   return clip;
 }
 

@@ -3,6 +3,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdlib>
+#include <numeric>
 #include <system_error>
 #include <utility>
 
@@ -19,6 +21,22 @@ constexpr std::uintmax_t kFilledUp = 1'900'000'000;  // bytes: cameras split fil
 
 Error film_error(const std::string& what, const fs::path& file, const std::string& remedy) {
   return {ErrorKind::bad_input, what, file.string(), remedy};
+}
+
+/// Whether the files' own names or times show that `next` doesn't follow `before`.
+std::optional<std::string> contradiction(const session::ClipPart& before, const session::ClipPart& next) {
+  const std::string name = before.path.filename().string();
+  const auto a = session::gopro_chapter(before.path);
+  const auto b = session::gopro_chapter(next.path);
+  if (a && b && a->recording != b->recording)
+    return fmt::format("is of recording {}, {} is of recording {}", b->recording, name, a->recording);
+  const auto number = [](const std::string& chapter) { return std::atoi(chapter.c_str()); };
+  if (a && b && number(b->chapter) > number(a->chapter) + 1)
+    return fmt::format("is chapter {} of its recording, and follows {}: a chapter between them is missing",
+                       b->chapter, name);
+  if (before.scan.created_ns && next.scan.created_ns && *next.scan.created_ns < *before.scan.created_ns)
+    return fmt::format("was begun before {}, by their creation times", name);
+  return {};
 }
 
 /// Whether `next` begins where `before` ends.
@@ -48,6 +66,10 @@ std::optional<Error> joined_wrongly(const session::ClipPart& before, const sessi
                                   next.scan.frame_rate->value(), before.path.filename().string(),
                                   before.scan.frame_rate->value()),
                       next.path, "Leave one of them out");
+  }
+  if (const auto reason = contradiction(before, next)) {
+    return film_error(*reason, next.path,
+                      "Leave out what belongs to another recording, or give each a folder of its own");
   }
   if (options.continuity == Continuity::as_told || follows(before, next)) return {};
   return film_error(fmt::format("may not go on where {} ends: nothing in the files says so",
@@ -79,15 +101,41 @@ bool append(Film& film, session::ClipPart part, std::optional<Error>& problem) {
   return goes_on;
 }
 
+/// Notes what the file states on its display, once for a film of many files.
+void note_unapplied(Film& film, const session::ClipPart& part) {
+  for (const std::string& field : part.scan.unapplied) {
+    const std::string note = field + ": frames stay as they are stored";
+    if (std::find(film.notes.begin(), film.notes.end(), note) == film.notes.end()) film.notes.push_back(note);
+  }
+}
+
+/// Notes the rate at which frames without time stamps are taken.
+void note_untimed(Film& film, const FilmOptions& options) {
+  film.notes.push_back(fmt::format("{} holds {} pictures without time stamps: taken at {:g} a second",
+                                   film.parts.front().path.filename().string(),
+                                   film.parts.front().scan.frames(), options.picture_rate.value()));
+}
+
 ProbedFilm of_pictures(const session::CameraFiles& files, const FilmOptions& options) {
   Film film{files, {}, {}, options.picture_rate, 0, {}, {}};
   const auto first = session::scan_video(files.files.front());
   if (!first.ok()) return {{}, FilmProblem{first.error(), {}}};
   film.size = first->size;
+  const bool stacks = first->frames() > 1;
   for (const fs::path& file : files.files) {
-    film.parts.push_back({file, *first, film.frames});  // each part is decoded when it is written
-    ++film.frames;
+    // Single pictures are decoded when they are written.
+    const bool scan_it = stacks && file != files.files.front();
+    Result<session::VideoScan> scan = scan_it ? session::scan_video(file) : first;
+    if (!scan.ok()) return {{}, FilmProblem{scan.error(), {}}};
+    film.parts.push_back({file, std::move(scan).value(), film.frames});
+    film.frames += film.parts.back().scan.frames();
   }
+  if (stacks) {
+    film.files.numbers.resize(static_cast<std::size_t>(film.frames));
+    std::iota(film.files.numbers.begin(), film.files.numbers.end(), 0);
+    note_untimed(film, options);
+  }
+  note_unapplied(film, film.parts.front());
   return {film, {}};
 }
 
@@ -115,6 +163,8 @@ ProbedFilm probe_film(const session::CameraFiles& files, const FilmOptions& opti
     film.size = first.size;
     film.frame_rate = first.frame_rate.value_or(options.picture_rate);
     film.created_ns = first.created_ns;
+    if (first.tick.value() == 0) note_untimed(film, options);
+    for (const session::ClipPart& part : film.parts) note_unapplied(film, part);
   }
   if (!problem) return {std::move(film), {}};
   const bool some = film.frames > 1;

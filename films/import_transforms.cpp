@@ -158,6 +158,8 @@ Result<ImportResult> import_transforms(const fs::path& transforms, const ImportO
                                recon::intrinsics_of(frame, first.layout().size));
     put_calibration(lens, frame.camera_from_world, *part.stream.mutable_calibration());
     if (response) *part.stream.mutable_colour()->mutable_spectral() = recon::message_of(*response);
+    for (const std::string& field : part.files.front().scan.unapplied)
+      result.notes.push_back(ids[i] + ": " + field + ": the calibration must be of the stored picture");
     ImportedCamera& camera = result.cameras.emplace_back();
     camera.id = part.stream.camera_id();
     camera.name = frame.image.filename().string();

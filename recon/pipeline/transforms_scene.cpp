@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cstdint>
 #include <cstring>
+#include <map>
 #include <set>
 #include <string>
 #include <system_error>
@@ -133,8 +134,13 @@ Status check_files(const std::vector<ChosenFrame>& chosen) {
       "Correct the paths, which start from the json's folder, or bring the files there");
 }
 
-Result<Image> read_picture(const fs::path& file, const TransformsFrame& frame, const char* key) {
-  auto image = session::read_image(file);
+/// Fields of pictures that aren't applied (EXIF orientations), with the names of the pictures that have them.
+using UnappliedFields = std::map<std::string, std::vector<std::string>>;
+
+/// `unapplied` receives the picture's fields that aren't applied.
+Result<Image> read_picture(const fs::path& file, const TransformsFrame& frame, const char* key,
+                           std::vector<std::string>* unapplied = nullptr) {
+  auto image = session::read_image(file, unapplied);
   if (image) return image;
   return Error{image.error().kind, image.error().message(), frame.where + key,
                std::string("Correct ") + (key + 1) + ", or bring the picture there"};
@@ -191,14 +197,22 @@ Result<SharedBounds> apply_mask(Image& image, const TransformsFrame& frame) {
   return share(std::move(marks));
 }
 
-Result<View> read_view(const ChosenFrame& chosen, bool white_is_transparent) {
+Result<View> read_view(const ChosenFrame& chosen, bool white_is_transparent, UnappliedFields& unapplied) {
   const TransformsFrame& frame = chosen.frame;
-  EMBERLOCK_ASSIGN_OR_RETURN(Image image, read_picture(frame.image, frame, ".file_path"));
+  std::vector<std::string> fields;
+  EMBERLOCK_ASSIGN_OR_RETURN(Image image, read_picture(frame.image, frame, ".file_path", &fields));
   if (white_is_transparent) EMBERLOCK_RETURN_IF_ERROR(check_white(image, frame));
   View view;
   view.name = frame.image.filename().string();
   view.role = chosen.role;
-  EMBERLOCK_ASSIGN_OR_RETURN(view.camera.intrinsics, intrinsics_of(frame, image.layout().size));
+  for (const std::string& field : fields) unapplied[field].push_back(view.name);
+  Result<Intrinsics> lens = intrinsics_of(frame, image.layout().size);
+  if (!lens.ok() && !fields.empty()) {  // a turned picture has its width and height exchanged
+    Error error = lens.error();
+    error.remedy += ". The picture's " + fields.front();
+    return error;
+  }
+  EMBERLOCK_ASSIGN_OR_RETURN(view.camera.intrinsics, std::move(lens));
   view.camera.camera_from_world = frame.camera_from_world;
   if (frame.mask) {
     EMBERLOCK_ASSIGN_OR_RETURN(view.bounds, apply_mask(image, frame));
@@ -220,11 +234,17 @@ Result<Scene> load_transforms(const fs::path& path, const SceneOptions& options)
   EMBERLOCK_ASSIGN_OR_RETURN(scene.response, response_of(transforms));
   scene.preprocessing = {{"all", false, "pictures of a transforms.json are taken as they are"}};
   std::size_t masked = 0;
+  UnappliedFields unapplied;
   for (const ChosenFrame& frame : chosen) {
-    EMBERLOCK_ASSIGN_OR_RETURN(View view, read_view(frame, transforms.white_is_transparent));
+    EMBERLOCK_ASSIGN_OR_RETURN(View view, read_view(frame, transforms.white_is_transparent, unapplied));
     masked += view.bounds ? 1 : 0;
     scene.views.push_back(std::move(view));
   }
+  for (const auto& [field, names] : unapplied)
+    scene.preprocessing.push_back(
+        {"orientation", false,
+         fmt::format("{}{}: {}: poses and lens must be those of the stored picture", names.front(),
+                     names.size() > 1 ? fmt::format(" and {} more", names.size() - 1) : "", field)});
   if (masked > 0)
     scene.preprocessing.push_back(
         {"masks", true,

@@ -137,7 +137,7 @@ inline Image deepened(const Image& image, int bit_depth) {
   for (int y = 0; y < image.layout().size.height; ++y) {
     for (int x = 0; x < image.layout().size.width; ++x)
       out.row_as<std::uint16_t>(y)[x] =
-          static_cast<std::uint16_t>((image.row_as<std::uint8_t>(y)[x] * white + 127) / 255);
+          static_cast<std::uint16_t>((image.view().row_as<std::uint8_t>(y)[x] * white + 127) / 255);
   }
   return out;
 }
@@ -167,7 +167,7 @@ inline Image through_prores(const Image& image) {
   for (int y = 0; y < size.height; ++y) {
     for (int x = 0; x < size.width; ++x)
       row_of(0, y)[x] =
-          static_cast<std::uint16_t>(kBlack + (image.row_as<std::uint8_t>(y)[x] * kRange + 127) / 255);
+          static_cast<std::uint16_t>(kBlack + (image.view().row_as<std::uint8_t>(y)[x] * kRange + 127) / 255);
     for (const int plane : {1, 2}) std::fill_n(row_of(plane, y), size.width / 2, std::uint16_t{512});
   }
   session::AvPtr<AVPacket> packet(av_packet_alloc());

@@ -309,8 +309,9 @@ TEST(SessionVerify, APipeInAFilesPlaceIsAFault) {
     const auto check = verify_session(temp / "s");
     EXPECT_FALSE(check && check->whole()) << file;
     EXPECT_FALSE(certify_session(temp / "s", "emberlock 1", nullptr).ok()) << file;
-    if (const auto session = SessionReader::open(temp / "s"); session && !there)
+    if (const auto session = SessionReader::open(temp / "s"); session && !there) {
       EXPECT_FALSE(read_shutter_times(*session).ok());
+    }
     std::filesystem::remove(file);
     if (there) std::filesystem::rename(temp / "kept", file);
   }

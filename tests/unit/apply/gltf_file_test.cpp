@@ -301,7 +301,9 @@ TEST_F(GltfFileTest, MorphWeightsAreNamedWhereTheyAreNotZero) {
     const auto scene = read(gltf.text());
     ASSERT_TRUE(scene.ok()) << scene.error().message();
     EXPECT_EQ(scene->notes.size(), named ? 1U : 0U) << nodes;
-    if (named) EXPECT_THAT(scene->notes[0], HasSubstr("morph weights"));
+    if (named) {
+      EXPECT_THAT(scene->notes[0], HasSubstr("morph weights"));
+    }
   }
 }
 

@@ -22,12 +22,12 @@ using testing::IsEmpty;
 using testing::Not;
 
 json two_frames() {
-  return json::parse(R"({"fl_x": 500, "w": 64, "h": 48, "frames": [
+  return json::parse_fields(R"({"fl_x": 500, "w": 64, "h": 48, "frames": [
       {"file_path": "a.png", "transform_matrix": [[1,0,0,0],[0,1,0,0],[0,0,1,0.5],[0,0,0,1]]},
       {"file_path": "b.png", "transform_matrix": [[1,0,0,0.1],[0,1,0,0],[0,0,1,0.5],[0,0,0,1]]}]})");
 }
 
-Result<Transforms> parse(const json& document) { return parse_transforms(document.dump(), "t.json"); }
+Result<Transforms> parse_fields(const json& document) { return parse_transforms(document.dump(), "t.json"); }
 
 /// The document with a field, in the first frame if it belongs into frames.
 json with_field(const TransformsField& field, const json& value) {
@@ -69,9 +69,9 @@ TEST(TransformsFields, EveryKeyIsInOneListAndInTheDocumentsTable) {
 TEST(TransformsFields, AUsedKeyIsReadSoThatAValueOfNoMeaningIsRefusedByName) {
   for (const TransformsField& field : transforms_fields()) {
     if (field.use != FieldUse::used || field.key == "white_transparent") continue;
-    EXPECT_THAT(parse(with_field(field, json::array({"x"}))), FailsWith(std::string(field.key)));
+    EXPECT_THAT(parse_fields(with_field(field, json::array({"x"}))), FailsWith(std::string(field.key)));
   }
-  EXPECT_TRUE(value_of(parse(with_field({"white_transparent"}, true))).white_is_transparent);
+  EXPECT_TRUE(value_of(parse_fields(with_field({"white_transparent"}, true))).white_is_transparent);
 }
 
 TEST(TransformsFields, ARefusedKeyIsNamedAnywhere) {
@@ -81,10 +81,10 @@ TEST(TransformsFields, ARefusedKeyIsNamedAnywhere) {
     const json value = key.starts_with("unit") || key.ends_with("model") || key.ends_with("type")
                            ? json("EQUIRECTANGULAR mm")
                            : json(0.25);
-    EXPECT_THAT(parse(with_field(field, value)), FailsWith(key));
+    EXPECT_THAT(parse_fields(with_field(field, value)), FailsWith(key));
     json document = two_frames();
     document["frames"][1][key] = value;
-    EXPECT_THAT(parse(document), FailsWith("frames[1]." + key));
+    EXPECT_THAT(parse_fields(document), FailsWith("frames[1]." + key));
   }
 }
 
@@ -92,7 +92,7 @@ TEST(TransformsFields, AnIgnoredKeyChangesNothingAndIsSilent) {
   for (const TransformsField& field : transforms_fields()) {
     if (field.use != FieldUse::ignored) continue;
     for (const json& value : {json(7), json("x"), json::array({1, 2})}) {
-      const auto read = parse(with_field(field, value));
+      const auto read = parse_fields(with_field(field, value));
       ASSERT_TRUE(read.ok()) << field.key;
       EXPECT_THAT(read->passed_over, IsEmpty()) << field.key;
     }
@@ -109,12 +109,12 @@ TEST(TransformsFields, AValueThatChangesNothingIsAccepted) {
       {"units", "m"},     {"distortion_params", json::array({0, 0, 0, 0})},
       {"unit", "Metres"}, {"rolling_shutter", json::array({0, 0, 0})},
       {"s1", 0},          {"latlong", false}};
-  for (const auto& [key, value] : rows) EXPECT_TRUE(parse(with_field({key}, value)).ok()) << key << value;
+  for (const auto& [key, value] : rows) EXPECT_TRUE(parse_fields(with_field({key}, value)).ok()) << key << value;
   for (const char* model :
        {"OPENCV_FISHEYE", "RADIAL_FISHEYE", "SIMPLE_RADIAL_FISHEYE", "THIN_PRISM_FISHEYE"})
-    EXPECT_THAT(parse(with_field({"camera_model"}, model)), FailsWith("camera_model", "fisheye")) << model;
+    EXPECT_THAT(parse_fields(with_field({"camera_model"}, model)), FailsWith("camera_model", "fisheye")) << model;
   for (const char* model : {"FOV", "EQUIRECTANGULAR", "ORTHOPHOTO", ""})
-    EXPECT_THAT(parse(with_field({"camera_model"}, model)), FailsWith("camera_model", "no pinhole")) << model;
+    EXPECT_THAT(parse_fields(with_field({"camera_model"}, model)), FailsWith("camera_model", "no pinhole")) << model;
 }
 
 TEST(TransformsFields, AMisspelledKeyIsRefusedWithTheOneThatWasMeant) {
@@ -143,12 +143,12 @@ TEST(TransformsFields, AMisspelledKeyIsRefusedWithTheOneThatWasMeant) {
   for (const auto& [key, meant] : in_frames) {
     json document = two_frames();
     document["frames"][1][key] = 1;
-    EXPECT_THAT(parse(document),
+    EXPECT_THAT(parse_fields(document),
                 FailsWith(std::string("frames[1].") + key, std::string("did you mean ") + meant + "?"));
   }
   for (const auto& [key, meant] : std::vector<std::pair<const char*, const char*>>{
            {"Frames", "frames"}, {"N-Frames", "n_frames"}, {"camera_respnse", "camera_response"}})
-    EXPECT_THAT(parse(with_field({key}, 1)), FailsWith(std::string("did you mean ") + meant + "?"));
+    EXPECT_THAT(parse_fields(with_field({key}, 1)), FailsWith(std::string("did you mean ") + meant + "?"));
 }
 
 TEST(TransformsFields, UnknownKeysArePassedOverAndNamedInOneWarning) {
@@ -158,12 +158,12 @@ TEST(TransformsFields, UnknownKeysArePassedOverAndNamedInOneWarning) {
   for (json& frame : document["frames"])
     for (const char* key : {"blur_score", "timestamp", "camera_id", "frame", "iso", "weight", "num_frames"})
       frame[key] = 120.3;
-  const auto read = value_of(parse(document));
+  const auto read = value_of(parse_fields(document));
   EXPECT_THAT(read.passed_over,
               ElementsAre("applied_scale", "blur_score", "camera_id", "frame", "from_na", "iso", "num_frames",
                           "test_filenames", "timestamp", "train_filenames", "val_filenames", "weight"));
   EXPECT_THAT(passed_over_warning(read), HasSubstr("blur_score, camera_id"));
-  EXPECT_THAT(passed_over_warning(value_of(parse(two_frames()))), IsEmpty());
+  EXPECT_THAT(passed_over_warning(value_of(parse_fields(two_frames()))), IsEmpty());
 }
 
 TEST(TransformsFields, AllThatIsRefusedStandsInOneError) {
@@ -171,7 +171,7 @@ TEST(TransformsFields, AllThatIsRefusedStandsInOneError) {
   document["skew"] = 0.1;
   document["camera_modle"] = 1;
   for (json& frame : document["frames"]) frame["k5"] = frame["transform_matrx"] = 0.5;
-  const auto error = parse(document);
+  const auto error = parse_fields(document);
   ASSERT_THAT(error, FailsWith("skew", "camera_modle"));
   EXPECT_THAT(error.error().message(), HasSubstr("frames[0].k5"));
   EXPECT_THAT(error.error().message(), HasSubstr("1 more frames"));
@@ -184,7 +184,7 @@ TEST(TransformsFields, OtherNamesOfAFieldMeanTheSame) {
   document.erase("fl_x");
   document["x_fov"] = 90;
   document["frames"][1]["width"] = 128;
-  const auto read = value_of(parse(document));
+  const auto read = value_of(parse_fields(document));
   EXPECT_NEAR(intrinsics_of(read.frames[0], {64, 48})->fx, 32, 1e-9);
   EXPECT_THAT(intrinsics_of(read.frames[1], {64, 48}), FailsWith("frames[1].w, h"));
 }

@@ -88,7 +88,7 @@ std::vector<MarkerPoint> find_marker(const ImageView& picture, const Marker& mar
   for (const recon::MarkerInk ink : {recon::MarkerInk::dark, recon::MarkerInk::light}) {
     for (const recon::SeenMarker& seen : recon::find_markers(picture, marker.dictionary, lens, light, ink)) {
       if (seen.id != marker.id) continue;
-      if (!points.empty()) return {};  // two of one number tell no pose
+      if (!points.empty()) return {};  // two of one number determine no pose
       for (std::size_t c = 0; c < 4; ++c) points.push_back({corners[c], seen.corners[c]});
     }
     if (!points.empty()) break;

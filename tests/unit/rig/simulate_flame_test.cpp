@@ -305,8 +305,6 @@ TEST_F(SimulateFlameSlow, ACandleIsNotTakenForAThickMedium) {
   const auto choice = recon::choose_effects(*scene, grid, {}, {});
   ASSERT_TRUE(choice.ok()) << choice.error().message();
   const std::string& reason = choice->reports[0].reason;
-  EXPECT_NE(reason.find("on a finer grid views"), std::string::npos)
-      << "the first look was taken in: " << reason;
   EXPECT_EQ(choice->effects.extinction.model, recon::Extinction::Model::none) << reason;
   const auto done = recon::solve(*scene, grid, choice->effects, {});
   ASSERT_TRUE(done.ok()) << done.error().message();

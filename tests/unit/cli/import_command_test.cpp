@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <filesystem>
 #include <functional>
+#include <iterator>
 #include <string>
 #include <vector>
 
@@ -39,7 +40,8 @@ TEST(ImportCommand, ARefusalLeavesNothing) {
         words.insert(words.end(), options.begin(), options.end());
         const auto result = test::run_verb(add_import, words);
         EXPECT_EQ(result.exit_code, 2) << i << result.err;
-        EXPECT_EQ(std::distance(fs::directory_iterator(temp.path()), fs::directory_iterator()), 1) << i << ' ' << out;
+        EXPECT_EQ(std::distance(fs::directory_iterator(temp.path()), fs::directory_iterator()), 1)
+            << i << ' ' << out;
       }
     }
 }

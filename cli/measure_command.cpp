@@ -17,6 +17,7 @@
 #include "cli/result_files.h"
 #include "cli/up_axis.h"
 #include "recon/export/volume_file.h"
+#include "recon/render/volume.h"
 #include "recon/temperature/radiant.h"
 #include "report/html.h"
 
@@ -139,7 +140,7 @@ Result<Measured> measured(const NamedVolume& from, const Targets& targets, const
     return Error{ErrorKind::bad_input, "has no extinction, so that what it radiates isn't known",
                  file.string(),
                  "Reconstruct it with an absolute --response, with --effects auto or extinction=SIGMA"};
-  // Of a medium that is told to absorb evenly its emission knows better where it does.
+  // Emission shows where a medium absorbs; an even extinction that was given doesn't.
   recon::HotVolume hot{volume.grid, *kelvin, absorption ? *absorption : volume.extinction};
   const std::vector<float> share = recon::shares_inside(volume);
   for (std::size_t p = 0; p < share.size(); ++p) hot.absorption[p] *= share[p];
@@ -155,7 +156,7 @@ Result<Measured> measured(const NamedVolume& from, const Targets& targets, const
   // emits the same light.
   for (std::size_t p = 0; p < hot.kelvin.size(); ++p) {
     hot.kelvin[p] += sigma[p];
-    if (falls) hot.absorption[p] -= (share.empty() ? 1 : share[p]) * (*falls)[p];
+    if (falls) hot.absorption[p] -= (share.empty() ? 1.0F : share[p]) * (*falls)[p];
   }
   out.error = difference(heat_of(hot, targets, compute), out.heat);
   return out;

@@ -48,8 +48,7 @@ ordered_json views_json(const Report& report) {
     views.push_back({{"index", views.size()},
                      {"name", view.name},
                      {"role", name(view.role)},
-                     {"rmse", view.rmse},
-                     {"no_light", view.no_light}});
+                     {"rmse", view.rmse}});
   }
   return views;
 }

@@ -108,7 +108,7 @@ struct Report {
 /// `preprocessing` [{step, on, reason}], `trace`
 /// [{seconds, iteration, input_rmse, heldout_rmse}] up to the iteration that was kept, `discarded` (the same
 /// of those after it), `trace_sample` {pixels, of} (its held-out errors are estimates from so many pixels,
-/// scaled so that the last is that of all), `views` [{index, name, role, rmse, no_light}], `deviations` (of
+/// scaled so that the last is that of all), `views` [{index, name, role, rmse}], `deviations` (of
 /// the paper's solver from the paper), `voxel_choice` {rule, voxels, by_the_paper, calibration_seconds,
 /// expected_seconds, options [{voxels, seconds, error}], words}, `plan` (null without a budget or target),
 /// `errors` (null unless asked for: {light, emission, extinction, solves, seconds, noise: null or {pixel,

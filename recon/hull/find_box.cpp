@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <optional>
 #include <string>
 
 #include <Eigen/Geometry>
@@ -80,6 +81,23 @@ void tighten(const std::vector<HalfSpace>& cones, Bounds& bounds) {
   }
 }
 
+/// The view without which the cones of the others meet; nothing where that isn't one view.
+std::optional<std::string> odd_view(const Scene& scene, const std::vector<FlameMask>& masks,
+                                    const Bounds& region) {
+  std::optional<std::string> odd;
+  for (std::size_t left_out = 0; left_out < scene.views.size(); ++left_out) {
+    std::vector<HalfSpace> cones;
+    for (std::size_t v = 0; v < scene.views.size(); ++v)
+      if (v != left_out && !masks[v].box.empty()) add_cone(scene.views[v].camera, masks[v].box, cones);
+    Bounds bounds = region;
+    tighten(cones, bounds);
+    if (masks[left_out].box.empty() || bounds.empty()) continue;
+    if (odd) return std::nullopt;
+    odd = scene.views[left_out].name;
+  }
+  return odd;
+}
+
 /// The bounds of the remaining voxels within the cones, to a voxel.
 Bounds bounds_of(const Hull& hull, const std::vector<HalfSpace>& cones) {
   const Grid& g = hull.grid;
@@ -133,7 +151,10 @@ Result<Box> find_box(const Scene& scene, const std::vector<FlameMask>& masks, co
   Bounds bounds{middle - far, middle + far};
   tighten(cones, bounds);
   const auto apart = [&] {
-    return no_box("box", "the views' flames don't meet anywhere in space",
+    const auto odd = odd_view(scene, masks, {middle - far, middle + far});
+    return no_box("box",
+                  "the views' flames don't meet anywhere in space" +
+                      (odd ? ", but without " + *odd + " they do" : std::string()),
                   "Check that the cameras' poses are right and that all pictures show the same flame");
   };
   if (bounds.empty()) return apart();

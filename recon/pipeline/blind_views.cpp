@@ -85,17 +85,17 @@ std::optional<std::string> blindness(const View& view, const FlameMask& mask, co
 
 Result<PreparedScene> leave_out_blind_views(PreparedScene scene, const ComputeOptions& compute,
                                             std::vector<std::string>& warnings) {
-  const Scene& told = scene.told();
+  const Scene& filmed = scene.told();
   const SharedMasks masks = scene.masks(std::nullopt, compute);
   std::vector<std::size_t> blind;
   std::vector<std::string> words;
   std::size_t inputs = 0;
   std::size_t blind_inputs = 0;
-  for (std::size_t v = 0; v < told.views.size(); ++v) {
-    const View& view = told.views[v];
+  for (std::size_t v = 0; v < filmed.views.size(); ++v) {
+    const View& view = filmed.views[v];
     const bool input = view.role == ViewRole::input;
     inputs += input ? 1 : 0;
-    if (const auto why = blindness(view, (*masks)[v], told.box)) {
+    if (const auto why = blindness(view, (*masks)[v], filmed.box)) {
       blind.push_back(v);
       blind_inputs += input ? 1 : 0;
       words.push_back(fmt::format("{} {}", view.name, *why));

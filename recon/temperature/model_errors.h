@@ -19,8 +19,8 @@ class Dispersion {
  public:
   /// `meter`: of soot, by this response.
   Dispersion(const Thermometer& meter, const CameraResponse& response);
-  /// K; linear between temperatures 100 K apart, beyond 700 and 3500 K as there; 0 where the channels tell
-  /// nothing.
+  /// K; linear between temperatures 100 K apart, beyond 700 and 3500 K as there; 0 where no channel
+  /// differs.
   [[nodiscard]] double at(double kelvin) const;
 
  private:

@@ -208,8 +208,8 @@ void add_error(Readings& readings, const Off& off) {
   }
 }
 
-/// Nobody told what glows: what the other kind would tell is part of each temperature's error. Where that
-/// doesn't explain what is seen there is nothing to add; where it tells no temperature for another reason,
+/// Where the emitter isn't given, what the other kind would read is part of each temperature's error. Where
+/// that doesn't explain what is seen there is nothing to add; where it has no temperature for another reason,
 /// how far it is off isn't known.
 void doubt_emitter(const Readings& other, Readings& readings) {
   add_error(readings, [&](std::size_t p) {
@@ -366,8 +366,8 @@ void doubt_resolution(const Asked& asked, Emitter emitter, const std::vector<flo
   });
 }
 
-/// By Kirchhoff's law: what absorbs emits. How bright a place is tells its absorption better than pictures of
-/// what lies behind it do.
+/// By Kirchhoff's law: what absorbs emits. A place's brightness fixes its absorption better than pictures
+/// of what lies behind it do.
 void find_absorption(const Asked& asked, Emitter emitter, TemperatureField& field) {
   const Volume& volume = asked.done.volume;
   const double brightest =

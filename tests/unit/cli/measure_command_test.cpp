@@ -97,7 +97,7 @@ TEST_F(MeasureCommandSlow, SaysWhatABallRadiates) {
   EXPECT_THAT(html, HasSubstr("power that the sphere catches"));
 }
 
-/// A thin ball's emission and temperature tell where it absorbs; an even extinction that was given doesn't.
+/// A thin ball's emission and temperature show where it absorbs; an even extinction that was given doesn't.
 TEST_F(MeasureCommandTest, AThinBallRadiatesByItsOwnAbsorption) {
   constexpr int kPoints = 13;
   for (const float absorption : {0.1F, 0.2F, 0.4F})

@@ -8,6 +8,8 @@
 #include <fmt/chrono.h>
 #include <fmt/format.h>
 
+#include "base/utc.h"
+
 namespace emberlock {
 
 TimePoint SteadyClock::now() const {
@@ -24,9 +26,13 @@ TimePoint wall_clock() {
   return {std::chrono::duration_cast<std::chrono::nanoseconds>(t).count()};
 }
 
-std::string utc_now() {
-  const std::int64_t ms = wall_clock().ns / 1'000'000;
-  return fmt::format("{:%FT%T}.{:03}Z", fmt::gmtime(static_cast<std::time_t>(ms / 1000)), ms % 1000);
+std::string utc_text(TimePoint wall_clock) {
+  const auto ms = std::chrono::floor<std::chrono::milliseconds>(std::chrono::nanoseconds(wall_clock.ns));
+  const auto whole = std::chrono::floor<std::chrono::seconds>(ms);
+  return fmt::format("{:%FT%T}.{:03}Z", fmt::gmtime(static_cast<std::time_t>(whole.count())),
+                     (ms - whole).count());
 }
+
+std::string utc_now() { return utc_text(wall_clock()); }
 
 }  // namespace emberlock

@@ -4,19 +4,19 @@
 #include <array>
 #include <chrono>
 #include <cstdlib>
-#include <ctime>
 #include <iterator>
 #include <memory>
 #include <string>
 #include <string_view>
 
-#include <fmt/chrono.h>
 #include <fmt/format.h>
 #include <spdlog/cfg/helpers.h>
 #include <spdlog/pattern_formatter.h>
 #include <spdlog/sinks/stdout_color_sinks.h>
 #include <sys/stat.h>
 #include <unistd.h>
+
+#include "base/utc.h"
 
 namespace emberlock {
 namespace {
@@ -53,11 +53,10 @@ std::string_view view(spdlog::string_view_t text) { return {text.data(), text.si
 class JsonFormatter final : public spdlog::formatter {
  public:
   void format(const spdlog::details::log_msg& message, spdlog::memory_buf_t& out) override {
-    const auto ms =
-        std::chrono::duration_cast<std::chrono::milliseconds>(message.time.time_since_epoch()).count();
-    fmt::format_to(std::back_inserter(out), R"({{"time":"{:%FT%T}.{:03}Z","level":"{}","category":")",
-                   fmt::gmtime(static_cast<std::time_t>(ms / 1000)), ms % 1000,
-                   view(spdlog::level::to_string_view(message.level)));
+    const auto since_1970 =
+        std::chrono::duration_cast<std::chrono::nanoseconds>(message.time.time_since_epoch());
+    fmt::format_to(std::back_inserter(out), R"({{"time":"{}","level":"{}","category":")",
+                   utc_text({since_1970.count()}), view(spdlog::level::to_string_view(message.level)));
     append_escaped(view(message.logger_name), out);
     fmt::format_to(std::back_inserter(out), R"(","thread":{},"message":")", message.thread_id);
     append_escaped(view(message.payload), out);

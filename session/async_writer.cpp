@@ -37,11 +37,21 @@ struct AsyncWriter::Shared {
     if (!failure) failure = status.error();
   }
 
+  void note_events(const Status& status) {
+    const std::scoped_lock lock(mutex);
+    if (!status && !events_failed) events_failed = Clock::now();
+    if (status) events_failed.reset();
+    events = status;
+  }
+
   SessionWriter writer;
   const AsyncWriterOptions options;
   std::mutex append_mutex;
   std::mutex mutex;
-  std::optional<Error> failure;  ///< guarded by mutex
+  // These are guarded by mutex.
+  std::optional<Error> failure;
+  Status events;  ///< what the newest sync found of them
+  std::optional<Clock::time_point> events_failed;
 };
 
 /// Thread that syncs what was handed to the operating system, periodically.
@@ -68,6 +78,7 @@ class AsyncWriter::Syncer {
       const Clock::time_point begun = Clock::now();
       lock.unlock();
       shared_.note(shared_.writer.sync());
+      shared_.note_events(shared_.writer.events_failure());
       lock.lock();
       wake_.wait_until(lock, std::max(begun + as_duration(kSyncInterval), Clock::now() + kPause),
                        [this] { return ended_; });
@@ -136,6 +147,11 @@ class AsyncWriter::Lane {
     const std::uint64_t by_driver = now.counts.transport() + now.counts.underrun() + now.counts.passed_over();
     now.counts.set_camera_gap(arrivals_.missing() - std::min(arrivals_.missing(), by_driver));
     return now;
+  }
+
+  std::optional<DiskTrouble> trouble() {
+    const std::scoped_lock lock(mutex_);
+    return written_.trouble;
   }
 
   WriterLoad load() {
@@ -309,6 +325,20 @@ Status AsyncWriter::append(const v1::Event& event) {
 std::optional<Error> AsyncWriter::failure() const {
   const std::scoped_lock lock(shared_->mutex);
   return shared_->failure;
+}
+
+std::optional<DiskTrouble> AsyncWriter::trouble() const {
+  std::optional<DiskTrouble> worst;
+  {
+    const std::scoped_lock lock(shared_->mutex);
+    if (shared_->events_failed) worst = DiskTrouble{shared_->events.error(), since(*shared_->events_failed)};
+  }
+  for (const auto& lane : lanes_) {
+    std::optional<DiskTrouble> one = lane->trouble();
+    const auto rank = [](const DiskTrouble& trouble) { return std::pair(trouble.is_final, trouble.lasting); };
+    if (one && (!worst || rank(*worst) < rank(*one))) worst = std::move(one);
+  }
+  return worst;
 }
 
 CameraProgress AsyncWriter::progress(std::size_t camera) const { return lanes_.at(camera)->progress(); }

@@ -62,6 +62,8 @@ class AsyncWriter {
   Status append(const v1::Event& event);
   /// The first failure of an encoder or of the disk. Recording continues after it.
   [[nodiscard]] std::optional<Error> failure() const;
+  /// What is refused now, of any camera or of the events: the refusal that has lasted the longest.
+  [[nodiscard]] std::optional<DiskTrouble> trouble() const;
   [[nodiscard]] CameraProgress progress(std::size_t camera) const;
   [[nodiscard]] WriterLoad load() const;
 

@@ -20,6 +20,7 @@ namespace {
 
 constexpr Seconds kSpaceCheckInterval{1};
 constexpr Seconds kRetryInterval{1};
+constexpr Seconds kTroubleOver = 2 * kRetryInterval;
 constexpr std::uint64_t kSpaceCheckBytes = std::uint64_t{64} << 20;
 constexpr std::uint32_t kLongestGapMs = 60'000;
 /// The limit of segments kept open when no other thread syncs.
@@ -58,17 +59,24 @@ Result<std::unique_ptr<CameraWriter>> CameraWriter::create(const fs::path& folde
 
 Status CameraWriter::write(const Frame& frame) {
   arrivals_.add(frame.stamp.frame_id);
+  now_ = frame.stamp.monotonic_time;
   Status written = failed_ ? Status(*failed_) : write_pixels(frame);
-  if (!written) counts_.set_disk(counts_.disk() + 1);
+  if (written) {
+    note_success();
+  } else {
+    counts_.set_disk(counts_.disk() + 1);
+  }
   return written;
 }
 
 Status CameraWriter::write_pixels(const Frame& frame) {
   if (!frame.image || frame.image->layout() != layout_) {
-    return Error{ErrorKind::bad_input,
-                 "the frame's size or format isn't the one that the session was created with",
-                 "camera " + camera_id_ + ", frame " + std::to_string(frame.stamp.frame_id),
-                 "Give each layout a session of its own"};
+    Error other{ErrorKind::bad_input,
+                "the frame's size or format isn't the one that the session was created with",
+                "camera " + camera_id_ + ", frame " + std::to_string(frame.stamp.frame_id),
+                "Give each layout a session of its own"};
+    note_refusal(other);
+    return other;
   }
   if (Status synced = check_sync(); !synced) {
     refuse(synced.error(), frame.stamp);
@@ -78,7 +86,11 @@ Status CameraWriter::write_pixels(const Frame& frame) {
   refusal_.reset();
   if (Status room = make_room(frame.stamp); !room) {
     // Below the floor, free space is checked for each frame: it is cheap, and a frame may fit again.
-    if (!space_low_) refuse(room.error(), frame.stamp);
+    if (space_low_) {
+      note_refusal(room.error());
+    } else {
+      refuse(room.error(), frame.stamp);
+    }
     return room;
   }
   v1::Segment& segment = *segments_.rbegin();
@@ -200,13 +212,25 @@ void CameraWriter::drop_what_is_not_safe(const Error& why) {
   if (!segments_.empty()) segments_.rbegin()->set_frames(safe - segments_.rbegin()->first_frame());
 }
 
+void CameraWriter::note_refusal(const Error& why) {
+  trouble_ = Trouble{why, trouble_ ? trouble_->first : now_, now_, ledger_->safe()};
+}
+
+/// What was written after a refusal counts once it is on the disk: an encoder's buffer takes frames too.
+void CameraWriter::note_success() {
+  if (trouble_ && now_ - trouble_->newest > kTroubleOver && ledger_->safe() > trouble_->safe)
+    trouble_.reset();
+}
+
 void CameraWriter::warn(const Error& why) {
+  note_refusal(why);
   // A full disk is reported once.
   const auto level = std::exchange(warned_, true) ? spdlog::level::debug : spdlog::level::warn;
   log(LogCategory::session).log(level, "camera {}: {}", camera_id_, why.message());
 }
 
 void CameraWriter::refuse(const Error& why, const FrameStamp& stamp) {
+  note_refusal(why);
   refusal_ = why;
   retry_at_ = stamp.monotonic_time + kRetryInterval;
 }
@@ -273,6 +297,8 @@ CameraProgress CameraWriter::progress() const {
   CameraProgress now;
   now.written = ledger_->handed();
   now.counts.set_disk(counts_.disk());
+  if (trouble_)
+    now.trouble = DiskTrouble{trouble_->error, trouble_->newest - trouble_->first, failed_.has_value()};
   now.bytes = bytes_closed_ + (segment_ ? segment_->bytes() : 0) + kIndexHeaderBytes +
               counts_.recorded() * kIndexRecordBytes;
   return now;

@@ -52,6 +52,8 @@ class CameraWriter {
   Status check_sync();
   void drop_what_is_not_safe(const Error& why);
   void warn(const Error& why);
+  void note_refusal(const Error& why);
+  void note_success();
   [[nodiscard]] std::uint32_t next_milliseconds(const FrameStamp& stamp) const;
   Result<v1::Counts> reconcile() const;
 
@@ -78,6 +80,14 @@ class CameraWriter {
   v1::Counts counts_;
   std::optional<Error> refusal_;  ///< the disk's last error; the next try is due at retry_at_
   TimePoint retry_at_;            ///< by the frames' clock
+  /// The disk's refusals, by the frames' clock.
+  struct Trouble {
+    Error error;
+    TimePoint first, newest;
+    std::uint64_t safe = 0;  ///< frames, at the newest
+  };
+  std::optional<Trouble> trouble_;
+  TimePoint now_;  ///< of the newest frame
   bool warned_ = false;
   std::optional<Error> failed_;  ///< the state of the index on disk is unknown: nothing more can be written
 };

@@ -66,22 +66,55 @@ Result<EventLog> EventLog::open(const std::filesystem::path& path, Mode mode) {
     return Error{ErrorKind::refused, "the session is still being written by another process", path.string(),
                  "Stop that recorder, or wait for it"};
   }
-  return EventLog(std::move(fd), path);
+  EventLog log(std::move(fd), path);
+  log.disk_->synced = ::lseek(log.fd_.get(), 0, SEEK_END);
+  return log;
+}
+
+Status EventLog::write_again() const {
+  if (::ftruncate(fd_.get(), disk_->synced) != 0) return errno_error(path_, "cannot cut off a torn event");
+  EMBERLOCK_RETURN_IF_ERROR(write_fully(fd_.get(), disk_->unsynced, path_));
+  disk_->torn = false;
+  return {};
 }
 
 Status EventLog::append(const v1::Event& event) {
-  const off_t end = ::lseek(fd_.get(), 0, SEEK_END);
-  Status written = write_fully(fd_.get(), encode(event), path_);
+  const std::string bytes = encode(event);
+  const std::scoped_lock lock(disk_->mutex);
+  disk_->unsynced += bytes;
   disk_->behind = true;
+  if (!disk_->torn && write_fully(fd_.get(), bytes, path_)) return {};
   // A partial event would make all later ones unreadable.
-  if (!written && ::ftruncate(fd_.get(), end) != 0) return errno_error(path_, "cannot cut off a torn event");
-  return written;
+  disk_->torn = true;
+  return write_again();
 }
 
 Status EventLog::sync() {
-  const std::scoped_lock lock(disk_->syncing);
-  if (disk_->failure && disk_->behind.exchange(false) && ::fdatasync(fd_.get()) != 0)
-    disk_->failure = errno_error(path_, "cannot flush");
+  const std::scoped_lock one_at_a_time(disk_->syncing);
+  std::size_t bytes = 0;
+  {
+    const std::scoped_lock lock(disk_->mutex);
+    if (!disk_->behind) return disk_->failure;
+    if (disk_->torn) disk_->failure = write_again();
+    if (disk_->torn) return disk_->failure;
+    bytes = disk_->unsynced.size();
+    disk_->behind = false;
+  }
+  const bool synced = ::fdatasync(fd_.get()) == 0;
+  const Status done = synced ? Status{} : Status(errno_error(path_, "cannot flush"));
+  const std::scoped_lock lock(disk_->mutex);
+  disk_->failure = done;
+  if (!done) {
+    disk_->torn = disk_->behind = true;
+    return done;
+  }
+  disk_->synced += static_cast<off_t>(bytes);
+  disk_->unsynced.erase(0, bytes);
+  return done;
+}
+
+Status EventLog::failure() const {
+  const std::scoped_lock lock(disk_->mutex);
   return disk_->failure;
 }
 

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <atomic>
 #include <cstddef>
 #include <filesystem>
 #include <memory>
@@ -9,6 +8,8 @@
 #include <string>
 #include <string_view>
 #include <vector>
+
+#include <sys/types.h>
 
 #include "base/result.h"
 #include "base/unique_fd.h"
@@ -35,17 +36,25 @@ class EventLog {
   enum class Mode { create, reopen };
   /// Error `refused` where another process holds the lock, because it is recording the session.
   static Result<EventLog> open(const std::filesystem::path& path, Mode mode);
+  /// An event that the disk refuses is written again by the next call. One thread at a time.
   Status append(const v1::Event& event);
-  /// Syncs what was appended to the disk. After an error every later call fails too, because the kernel
-  /// reports a failed write only once. Any thread.
+  /// Syncs what was appended to the disk. After an error the next call writes again what isn't synced,
+  /// because the kernel reports a failed write only once. Any thread.
   Status sync();
+  /// What the newest sync() returned. Any thread.
+  [[nodiscard]] Status failure() const;
 
  private:
   struct Disk {
-    std::mutex syncing;  ///< guards `failure`
+    std::mutex syncing;    ///< one sync at a time
+    std::mutex mutex;      ///< guards the members below
+    off_t synced = 0;      ///< bytes of the file
+    std::string unsynced;  ///< behind them
+    bool torn = false;     ///< the file may hold something else there
+    bool behind = true;    ///< something was appended since the last sync
     Status failure;
-    std::atomic<bool> behind = true;  ///< events were appended since the last sync
   };
+  Status write_again() const;  ///< requires the lock
   EventLog(UniqueFd fd, std::filesystem::path path) : fd_(std::move(fd)), path_(std::move(path)) {}
   UniqueFd fd_;
   std::filesystem::path path_;

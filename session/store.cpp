@@ -2,14 +2,16 @@
 #include "session/store.h"
 
 #include <algorithm>
-#include <ctime>
 #include <system_error>
 #include <utility>
 
 #include <fmt/format.h>
+#include <sys/stat.h>
+#include <sys/statvfs.h>
 #include <unistd.h>
 
 #include "base/file.h"
+#include "base/utc.h"
 #include "session/files.h"
 #include "session/index.h"
 #include "session/name.h"
@@ -73,12 +75,22 @@ bool looks_taken(const fs::path& folder, const std::string& stored) {
   return false;
 }
 
+/// The disk of a folder, or of the closest one above it that exists: a folder that was removed is made there
+/// again.
+std::optional<DiskId> disk_of(fs::path folder) {
+  std::error_code unknown;
+  while (!fs::exists(folder, unknown) && folder.has_relative_path()) folder = folder.parent_path();
+  if (folder.empty()) folder = ".";
+  struct stat info {};
+  struct statvfs file_system {};
+  if (::stat(folder.c_str(), &info) != 0 || ::statvfs(folder.c_str(), &file_system) != 0) return std::nullopt;
+  return DiskId{file_system.f_fsid, info.st_dev};
+}
+
 std::string name_of_time(TimePoint wall_clock) {
-  const std::time_t seconds = wall_clock.ns / 1'000'000'000;
-  std::tm parts{};
-  ::gmtime_r(&seconds, &parts);
-  return fmt::format("{:04}-{:02}-{:02} {:02}-{:02}-{:02}", parts.tm_year + 1900, parts.tm_mon + 1,
-                     parts.tm_mday, parts.tm_hour, parts.tm_min, parts.tm_sec);
+  std::string text = utc_text(wall_clock).substr(0, 19);  // "2026-11-22T02:50:00"
+  std::replace(text.begin(), text.end(), ':', '-');
+  return text.replace(text.find('T'), 1, " ");
 }
 
 }  // namespace
@@ -116,7 +128,17 @@ Result<SessionStore> SessionStore::open(fs::path folder, StoreOptions options) {
     return Error{ErrorKind::io, "recordings can't be written here: " + reason, folder.string(),
                  "Name another folder, or make it writable"};
   }
-  return SessionStore(std::move(folder), options);
+  const std::optional<DiskId> disk = disk_of(folder);
+  if (!disk) return errno_error(folder, "cannot ask for its disk");
+  return SessionStore(std::move(folder), options, *disk);
+}
+
+Status SessionStore::check_disk() const {
+  const std::optional<DiskId> disk = disk_of(folder_);
+  if (disk && *disk == disk_) return {};
+  return Error{ErrorKind::refused,
+               "this folder lies on another disk than at the start: the disk of the recordings isn't mounted",
+               folder_.string(), "Mount that disk again, or restart to record to this one"};
 }
 
 v1::ListSessionsResponse SessionStore::list() const {
@@ -138,6 +160,7 @@ Result<fs::path> SessionStore::path_of(std::string_view name) const {
 }
 
 Result<fs::path> SessionStore::path_for_new(std::string_view name, TimePoint wall_clock) const {
+  EMBERLOCK_RETURN_IF_ERROR(check_disk());
   std::error_code ec;
   if (!name.empty()) {
     EMBERLOCK_RETURN_IF_ERROR(check_session_name(name));
@@ -156,6 +179,7 @@ Result<fs::path> SessionStore::path_for_new(std::string_view name, TimePoint wal
 
 Result<fs::path> SessionStore::path_for_export(std::string_view name, std::string_view what) const {
   EMBERLOCK_RETURN_IF_ERROR(check_session_name(name));
+  EMBERLOCK_RETURN_IF_ERROR(check_disk());
   fs::path path = folder_.parent_path();
   for (const std::string_view part : {std::string_view("exports"), name, what}) {
     path /= part;
@@ -168,6 +192,7 @@ Result<fs::path> SessionStore::path_for_export(std::string_view name, std::strin
 }
 
 Result<v1::StorageStatus> SessionStore::storage(double bytes_per_s) const {
+  EMBERLOCK_RETURN_IF_ERROR(check_disk());
   std::error_code ec;
   const fs::space_info space = fs::space(folder_, ec);
   if (ec) return Error{ErrorKind::io, "cannot ask for free space: " + ec.message(), folder_.string()};

@@ -78,6 +78,13 @@ class NewFolder {
   bool kept_ = true;            ///< before create() nothing is ours
 };
 
+/// A disk that refuses one write may take the next. Both are written from the start again.
+template <class Write>
+Status try_twice(const Write& write) {
+  const Status once = write();
+  return once ? once : write();
+}
+
 Status check_options(const WriterOptions& options) {
   if (options.frames_per_segment >= 1 && options.bytes_per_segment >= 1) return {};
   return Error{ErrorKind::bad_input, "a segment must hold at least one frame and one byte", "session options",
@@ -142,6 +149,8 @@ Status SessionWriter::sync() {
   return first;
 }
 
+Status SessionWriter::events_failure() const { return events_->failure(); }
+
 std::uint64_t SessionWriter::safe(std::size_t camera) const { return cameras_.at(camera)->safe(); }
 
 CameraProgress SessionWriter::progress(std::size_t camera) const { return cameras_.at(camera)->progress(); }
@@ -160,10 +169,10 @@ Result<v1::Manifest> SessionWriter::finish(const Progress& progress) {
     if (first && !done) first = done;
   }
   if (!first) return first.error();
-  EMBERLOCK_RETURN_IF_ERROR(events_->sync());
+  EMBERLOCK_RETURN_IF_ERROR(try_twice([this] { return events_->sync(); }));
   manifest_.set_state(v1::Manifest::COMPLETE);
   drop_reserve(folder_);
-  EMBERLOCK_RETURN_IF_ERROR(write_manifest(folder_, manifest_));
+  EMBERLOCK_RETURN_IF_ERROR(try_twice([this] { return write_manifest(folder_, manifest_); }));
   return manifest_;
 }
 

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "base/frame.h"
@@ -59,6 +60,14 @@ class Arrivals {
   std::uint64_t last_id_ = 0;
 };
 
+/// The disk refuses what is written. It is over once later frames are on the disk, and nothing was refused
+/// for two seconds.
+struct DiskTrouble {
+  Error error;            ///< of the newest refusal
+  Seconds lasting{0};     ///< from the first refusal to the newest
+  bool is_final = false;  ///< nothing is tried again
+};
+
 /// Progress of one camera's recording: arrived = queued + written + lost by queue and disk.
 struct CameraProgress {
   std::uint64_t arrived = 0;  ///< frames passed to push()
@@ -70,6 +79,7 @@ struct CameraProgress {
   std::uint64_t bytes = 0;    ///< handed to the operating system: segments and index
   /// The counts that finish() would report now, with recorded = safe. Queued frames are in none of them.
   v1::Counts counts;
+  std::optional<DiskTrouble> trouble = {};
 };
 
 /// Writes a session's folder. Everything recorded is on the disk after finish(); before that, what flush()
@@ -106,6 +116,8 @@ class SessionWriter {
   /// other calls, which don't wait for it. A failure is also reported by the cameras' next write; frames that
   /// aren't safe then count as lost to the disk.
   Status sync();
+  /// What the newest sync() found of the events, which a later one writes again. Any thread.
+  [[nodiscard]] Status events_failure() const;
   /// Number of frames that would survive a power cut. Any thread.
   [[nodiscard]] std::uint64_t safe(std::size_t camera) const;
   /// What was written, and what the disk refused; without the caller's queue. Called by the camera's thread.

@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <array>
 #include <cerrno>
+#include <cmath>
 #include <csignal>
 #include <cstdlib>
 #include <functional>
@@ -15,12 +16,16 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include "base/file.h"
 #include "session/async_writer.h"
+#include "session/events.h"
 #include "session/files.h"
 #include "session/join.h"
+#include "session/store.h"
 #include "session/verify.h"
 #include "tests/support/recording.h"
 #include "tests/support/session_parts.h"
+#include "tests/support/wait.h"
 
 // A disk that is full, in earnest: a process of its own records to a small file system in memory (in a mount
 // namespace), or may not let a file grow.
@@ -144,6 +149,144 @@ TEST_P(FullDiskThreads, FilesThatMayNotGrowAreAsAFullDisk) {
     std::uint64_t lost = 0;
     return record_all(temp / "s", GetParam(), lost);
   });
+  EXPECT_EQ(code, 0);
+}
+
+/// As long as it lives, no file of this process may grow.
+class NoGrowth {
+ public:
+  NoGrowth() {
+    std::signal(SIGXFSZ, SIG_IGN);
+    ::getrlimit(RLIMIT_FSIZE, &before_);
+    const rlimit none{1, before_.rlim_max};
+    ::setrlimit(RLIMIT_FSIZE, &none);
+  }
+  NoGrowth(const NoGrowth&) = delete;
+  NoGrowth& operator=(const NoGrowth&) = delete;
+  ~NoGrowth() { ::setrlimit(RLIMIT_FSIZE, &before_); }
+
+ private:
+  rlimit before_{};
+};
+
+constexpr double kRefusalRate = 20;
+
+/// Pushes frames of this many seconds, and waits until each has been tried.
+void push_seconds(AsyncWriter& writer, double seconds, std::uint64_t& pushed) {
+  for (const auto end = pushed + static_cast<std::uint64_t>(std::llround(seconds * kRefusalRate));
+       pushed < end; ++pushed) {
+    Frame frame = noise_frame({{32, 24}, PixelFormat::gray8, 8}, pushed);
+    frame.stamp.monotonic_time.ns =
+        static_cast<std::int64_t>(1e9 + 1e9 / kRefusalRate * static_cast<double>(pushed));
+    static_cast<void>(writer.push(0, std::move(frame)));
+  }
+  test::wait_until([&] { return writer.progress(0).queued == 0; });
+}
+
+v1::Event note_event(int number) {
+  v1::Event event;
+  event.set_monotonic_ns(number);
+  return event;
+}
+
+/// The disk refuses all from a second on, until a later one.
+std::string record_over_refusals(const std::filesystem::path& folder, Encoding encoding, double from,
+                                 double until) {
+  auto session = SessionWriter::create(folder, manifest_of({{{32, 24}, PixelFormat::gray8, 8}}),
+                                       small_disk_options(encoding));
+  if (!session) return session.error().message();
+  AsyncWriter writer(std::move(session).value(), {.queue_time = Seconds(1e3), .when_full = WhenFull::wait});
+  std::uint64_t pushed = 0;
+  static_cast<void>(writer.append(note_event(1)));
+  push_seconds(writer, from, pushed);
+  if (writer.trouble()) return "trouble before there is any";
+  {
+    const NoGrowth no_growth;
+    static_cast<void>(writer.append(note_event(2)));
+    push_seconds(writer, std::max(until - from, 1 / kRefusalRate), pushed);
+    if (!test::wait_until([&] { return writer.trouble().has_value(); })) return "no trouble is reported";
+    const DiskTrouble trouble = *writer.trouble();
+    if (trouble.is_final) return "it isn't tried again: " + trouble.error.message();
+    if (until - from > 1.5 && trouble.lasting < Seconds(until - from - 1.5)) return "its length is wrong";
+  }
+  static_cast<void>(writer.append(note_event(3)));
+  push_seconds(writer, 4, pushed);
+  if (!test::wait_until([&] {
+        push_seconds(writer, 1 / kRefusalRate, pushed);
+        return !writer.trouble();
+      }))
+    return "the trouble doesn't end";
+  const auto manifest = writer.finish();
+  if (!manifest) return manifest.error().message();
+  const v1::Counts& counts = manifest->cameras(0).counts();
+  if (counts.recorded() + counts.disk() != pushed) return "a frame is unaccounted for";
+  // What an encoder holds, a quarter of a second, is lost with the segment.
+  if (static_cast<double>(counts.disk()) > (until - from + 1.5) * kRefusalRate + 1)
+    return "too many are lost: " + std::to_string(counts.disk());
+  if (manifest->cameras(0).segments_size() != (from > 1 ? 2 : 1)) return "segments";
+  const auto events = read_file(events_path(folder));
+  if (!events || parse_events(*events).events.size() != 3) return "an event is lost";
+  const auto check = verify_session(folder);
+  return check && check->whole() ? "" : "it can't be read back";
+}
+
+TEST(DiskThatRefusesThreads, ForAWhileIsReportedAndRecordedToAgain) {
+  for (const Encoding encoding : {Encoding::ffv1, Encoding::raw_nut, Encoding::huffman_nut})
+    for (const double from : {0.0, 2.0})
+      for (const double lasts : {0.0, 0.5, 1.5, 7.0}) {
+        const TempFolder temp;
+        EXPECT_EQ(
+            in_a_process([&] { return record_over_refusals(temp / "s", encoding, from, from + lasts); }), 0)
+            << static_cast<int>(encoding) << ", from " << from << " s, for " << lasts << " s";
+      }
+}
+
+/// Where recordings go before and after what happens to their disk.
+TEST(DiskThatIsUnmountedThreads, IsNeverRecordedOverOntoTheOneBelow) {
+  const TempFolder temp;
+  const int code = in_a_process([&]() -> std::string {
+    const std::filesystem::path disk = temp / "disk", other = temp / "other", at = temp / "at";
+    for (const auto& folder : {disk, other, at}) std::filesystem::create_directory(folder);
+    if (std::string wrong = mount_small_disk(disk, 2); !wrong.empty()) return wrong;
+    const auto mount = [&](const std::filesystem::path& which) {
+      return ::mount(which.c_str(), at.c_str(), nullptr, MS_BIND, nullptr) == 0;
+    };
+    const auto unmount = [&] { return ::umount2(at.c_str(), MNT_DETACH) == 0; };
+    if (::mount("other", other.c_str(), "tmpfs", 0, "size=2m") != 0 || !mount(disk)) return "no namespace";
+    const auto store = SessionStore::open(at / "deep" / "sessions", {.min_free_bytes = 0});
+    if (!store) return store.error().message();
+    const auto refuses = [&](const char* when) -> std::string {
+      const Error errors[] = {store->path_for_new("a", {1}).error(), store->path_for_new("", {1}).error(),
+                              store->path_for_export("a", "video").error(), store->storage(1).error(),
+                              store->check_disk().error()};
+      for (const Error& error : errors)
+        if (error.kind != ErrorKind::refused || error.what.find("another disk") == std::string::npos)
+          return when;
+      return "";
+    };
+    const auto accepts = [&](const char* when) -> std::string {
+      return store->path_for_new("a", {1}) && store->path_for_export("a", "video") && store->storage(1)
+                 ? ""
+                 : when;
+    };
+    const std::vector<std::function<std::string()>> steps{
+        [&] { return accepts("mounted"); },
+        [&] { return unmount() ? refuses("unmounted") : "umount"; },
+        [&] {
+          return std::filesystem::create_directories(store->folder()) ? refuses("a folder below") : "mkdir";
+        },
+        [&] { return mount(other) ? refuses("another disk") : "mount"; },
+        [&] { return unmount() && mount(disk) ? accepts("mounted again") : "mount"; },
+        [&] {
+          std::filesystem::remove_all(at / "deep");  // as a user would: it is made again on the same disk
+          return store->path_for_new("a", {1}) ? "" : "removed by the user";
+        },
+    };
+    for (const auto& step : steps)
+      if (std::string wrong = step(); !wrong.empty()) return wrong;
+    return "";
+  });
+  ASSERT_NE(code, kNoNamespace) << "nobody may mount here: run as root, or allow user namespaces";
   EXPECT_EQ(code, 0);
 }
 

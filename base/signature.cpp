@@ -9,6 +9,7 @@
 
 #include "base/file.h"
 #include "base/hex.h"
+#include "base/secret_file.h"
 
 namespace emberlock {
 namespace {
@@ -57,6 +58,7 @@ std::string public_digits(const EVP_PKEY* key) {
 Result<SigningKey> SigningKey::read(const std::filesystem::path& pem) {
   EMBERLOCK_ASSIGN_OR_RETURN(std::shared_ptr<EVP_PKEY> key,
                              read_pem(pem, PEM_read_bio_PrivateKey, "a private Ed25519 key in PEM"));
+  EMBERLOCK_RETURN_IF_ERROR(check_secret_file(pem, "the key"));
   std::string digits = public_digits(key.get());
   return SigningKey(std::move(key), std::move(digits));
 }

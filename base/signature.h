@@ -17,7 +17,8 @@ inline constexpr std::size_t kSignatureDigits = 128;
 
 class SigningKey {
  public:
-  /// Errors (bad_input): no PEM, one with a password, another kind of key.
+  /// Errors (bad_input): no PEM, one with a password, another kind of key, one that others may read or
+  /// replace.
   static Result<SigningKey> read(const std::filesystem::path& pem);
 
   /// 64 lower-case hexadecimal digits.
@@ -32,7 +33,7 @@ class SigningKey {
   std::string public_key_;
 };
 
-/// A public key's file as 64 hexadecimal digits. Errors: as SigningKey::read().
+/// A public key's file as 64 hexadecimal digits. Errors (bad_input): no PEM, another kind of key.
 Result<std::string> read_public_key(const std::filesystem::path& pem);
 
 /// Whether whoever holds the private key of `public_key` signed the text. Both are hexadecimal digits.

@@ -11,7 +11,9 @@
 #include <fcntl.h>
 #include <fmt/format.h>
 #include <openssl/crypto.h>
+#include <openssl/err.h>
 #include <openssl/pem.h>
+#include <openssl/ssl.h>
 #include <openssl/x509.h>
 #include <sys/file.h>
 #include <sys/random.h>
@@ -20,6 +22,7 @@
 #include <unistd.h>
 
 #include "base/file.h"
+#include "base/secret_file.h"
 
 namespace emberlock::rig {
 namespace {
@@ -48,6 +51,7 @@ struct Free {
 using Bio = std::unique_ptr<BIO, Free<BIO_free>>;
 using Certificate = std::unique_ptr<X509, Free<X509_free>>;
 using Key = std::unique_ptr<EVP_PKEY, Free<EVP_PKEY_free>>;
+using TlsContext = std::unique_ptr<SSL_CTX, Free<SSL_CTX_free>>;
 
 Bio bio_of(const std::string& pem) { return Bio(BIO_new_mem_buf(pem.data(), static_cast<int>(pem.size()))); }
 
@@ -62,28 +66,24 @@ Result<Certificate> parse_certificate(const std::string& pem, const fs::path& fi
                  "its first line is -----BEGIN CERTIFICATE-----"};
   if (X509_cmp_current_time(X509_get0_notAfter(first.get())) <= 0)
     return Error{ErrorKind::bad_input, "has run out", file.string(), "renew the certificate"};
+  if (X509_cmp_current_time(X509_get0_notBefore(first.get())) > 0)
+    return Error{ErrorKind::bad_input, "isn't valid yet", file.string(),
+                 "set this machine's clock, or make the certificate again"};
   return first;
 }
 
-}  // namespace
-
-Result<std::string> read_secret_file(const fs::path& file, std::size_t max_bytes, std::string_view what) {
-  EMBERLOCK_ASSIGN_OR_RETURN(std::string text, read_file(file, max_bytes));
-  struct stat status {};
-  if (::stat(file.c_str(), &status) != 0) return os_error(file, "stat");
-  const auto open_to = [&](std::string_view who, std::string_view remedy) {
-    return Error{ErrorKind::bad_input, fmt::format("{} {} (mode {:04o})", who, what, status.st_mode & 07777U),
-                 file.string(), fmt::format("make it private: chmod {} {}", remedy, file.string())};
-  };
-  // root checks a service user's files too.
-  if (status.st_uid != 0 && status.st_uid != ::geteuid() && ::geteuid() != 0)
-    return Error{ErrorKind::bad_input, fmt::format("another user owns {} (uid {})", what, status.st_uid),
-                 file.string(),
-                 fmt::format("make it root's, or the daemon's user's: chown USER {}", file.string())};
-  if ((status.st_mode & S_IRWXO) != 0) return open_to("everybody may read or write", "o=");
-  if ((status.st_mode & S_IWGRP) != 0) return open_to("its group may write to", "g-w");
-  return text;
+/// Has OpenSSL judge the certificate as a server's: its level of security refuses short keys and old hashes.
+Status check_strength(X509* certificate, const fs::path& file) {
+  const TlsContext context(SSL_CTX_new(TLS_server_method()));
+  ERR_clear_error();
+  if (context && SSL_CTX_use_certificate(context.get(), certificate) == 1) return {};
+  const char* const reason = ERR_reason_error_string(ERR_get_error());
+  return Error{ErrorKind::bad_input,
+               fmt::format("is refused by OpenSSL ({})", reason == nullptr ? "for no stated reason" : reason),
+               file.string(), "make it with a key of 256 bits (EC) or 2048 bits (RSA), and SHA-256"};
 }
+
+}  // namespace
 
 Result<std::string> random_secret() {
   std::array<unsigned char, 32> bytes{};
@@ -142,28 +142,38 @@ Result<TlsIdentity> TlsIdentity::read(const fs::path& certificate, const fs::pat
   if (X509_check_private_key(shown.get(), secret.get()) != 1)
     return Error{ErrorKind::bad_input, fmt::format("is not the key of {}", certificate.string()),
                  key.string(), "name the key that the certificate was made with"};
+  EMBERLOCK_RETURN_IF_ERROR(check_strength(shown.get(), certificate));
   return identity;
+}
+
+Result<std::string> read_authority(const fs::path& file) {
+  EMBERLOCK_ASSIGN_OR_RETURN(std::string pem, read_file(file, kLargestPem));
+  EMBERLOCK_RETURN_IF_ERROR(parse_certificate(pem, file));
+  return pem;
 }
 
 Result<ServerTls> ServerTls::read(const fs::path& certificate, const fs::path& key, const fs::path& clients) {
   ServerTls tls;
   EMBERLOCK_ASSIGN_OR_RETURN(tls.identity, TlsIdentity::read(certificate, key));
   if (clients.empty()) return tls;
-  EMBERLOCK_ASSIGN_OR_RETURN(tls.clients, read_file(clients, kLargestPem));
-  EMBERLOCK_RETURN_IF_ERROR(parse_certificate(tls.clients, clients));
+  EMBERLOCK_ASSIGN_OR_RETURN(tls.clients, read_authority(clients));
   return tls;
 }
 
 namespace {
 
+/// Whether there is nothing, or a socket that a daemon left behind.
+Status check_place(const fs::path& socket) {
+  struct stat found {};
+  if (::lstat(socket.c_str(), &found) != 0 || S_ISSOCK(found.st_mode)) return {};
+  return Error{ErrorKind::bad_input, "is there already, and no socket", socket.string(),
+               "choose another path"};
+}
+
 /// Removes a socket left behind by a daemon that no longer holds the lock; never any other file.
 Status remove_stale(const fs::path& socket) {
-  struct stat found {};
-  if (::lstat(socket.c_str(), &found) != 0) return {};
-  if (!S_ISSOCK(found.st_mode))
-    return Error{ErrorKind::bad_input, "is there already, and no socket", socket.string(),
-                 "choose another path"};
-  if (::unlink(socket.c_str()) != 0) return os_error(socket, "unlink");
+  EMBERLOCK_RETURN_IF_ERROR(check_place(socket));
+  if (::unlink(socket.c_str()) != 0 && errno != ENOENT) return os_error(socket, "unlink");
   return {};
 }
 
@@ -179,7 +189,7 @@ Status check_owner(const fs::path& folder) {
 
 /// An ordinary user's is for them alone; their group may be everybody's.
 Status make_folder(const fs::path& folder) {
-  if (folder.empty() || fs::is_directory(folder)) return check_owner(folder);
+  if (folder.empty() || fs::is_directory(folder)) return {};
   const mode_t group = ::geteuid() == 0 ? S_IRGRP | S_IXGRP : 0;
   if (::mkdir(folder.c_str(), S_IRWXU | group) == 0) return {};
   return os_error(folder, "mkdir", "make the folder, or choose another path for the socket");
@@ -187,12 +197,28 @@ Status make_folder(const fs::path& folder) {
 
 }  // namespace
 
-Result<SocketLock> SocketLock::take(const fs::path& socket) {
+Status SocketLock::check(const fs::path& socket) {
   if (socket.native().size() >= sizeof(sockaddr_un::sun_path))
     return Error{
         ErrorKind::bad_input,
         fmt::format("too long for a socket: {} characters at most", sizeof(sockaddr_un::sun_path) - 1),
         socket.string(), "choose a shorter path"};
+  const fs::path folder = socket.parent_path();
+  std::error_code unknown;
+  const fs::path above = folder.parent_path();
+  if (fs::exists(folder, unknown) && !fs::is_directory(folder, unknown))
+    return Error{ErrorKind::bad_input, "this is no folder", folder.string(),
+                 "choose another path for the socket"};
+  if (!folder.empty() && !fs::is_directory(folder, unknown) && !above.empty() &&
+      !fs::is_directory(above, unknown))
+    return Error{ErrorKind::bad_input, "there is no folder " + above.string(), socket.string(),
+                 "make the folder, or choose another path for the socket"};
+  EMBERLOCK_RETURN_IF_ERROR(check_owner(folder));
+  return check_place(socket);
+}
+
+Result<SocketLock> SocketLock::take(const fs::path& socket) {
+  EMBERLOCK_RETURN_IF_ERROR(check(socket));
   EMBERLOCK_RETURN_IF_ERROR(make_folder(socket.parent_path()));
   const fs::path lock_file = socket.string() + ".lock";
   UniqueFd file(

@@ -13,11 +13,6 @@
 // clients with the token.
 namespace emberlock::rig {
 
-/// Reads a file with a secret. Error bad_input: users other than its owner and group can read it, or users
-/// other than its owner can write to it; `what` names the secret: "the token".
-Result<std::string> read_secret_file(const std::filesystem::path& file, std::size_t max_bytes,
-                                     std::string_view what);
-
 /// 256 random bits as 64 hexadecimal digits. Error io: the kernel provides none.
 Result<std::string> random_secret();
 
@@ -48,10 +43,13 @@ struct TlsIdentity {
   std::string certificate;  ///< followed by its chain, if any
   std::string key;
 
-  /// Errors name the file and its fault: absent, not PEM, the key of another certificate, expired; for the
-  /// key also those of read_secret_file.
+  /// Errors name the file and its fault: absent, not PEM, the key of another certificate, expired or not yet
+  /// valid, too weak for OpenSSL; for the key also those of read_secret_file.
   static Result<TlsIdentity> read(const std::filesystem::path& certificate, const std::filesystem::path& key);
 };
+
+/// The certificates of an authority, as PEM. Errors name the file: absent, not PEM, expired or not yet valid.
+Result<std::string> read_authority(const std::filesystem::path& file);
 
 /// The daemon's TLS settings for network clients.
 struct ServerTls {
@@ -69,9 +67,11 @@ struct ServerTls {
 class SocketLock {
  public:
   /// Creates the socket's folder if necessary (0750 as root, else 0700) and removes a socket that a daemon
-  /// left behind. Error refused: another daemon, whose pid is named, holds the lock; the folder is another
-  /// user's.
+  /// left behind. Errors: those of check(); refused: another daemon, whose pid is named, holds the lock.
   static Result<SocketLock> take(const std::filesystem::path& socket);
+  /// What take() refuses of a path, found without touching it. Errors: bad_input (too long, no socket, its
+  /// folder can't be made), refused (the folder is another user's).
+  static Status check(const std::filesystem::path& socket);
 
  private:
   explicit SocketLock(UniqueFd file) : file_(std::move(file)) {}

@@ -8,6 +8,7 @@
 #include <unistd.h>
 
 #include "base/file.h"
+#include "base/secret_file.h"
 #include "recon/calibrate/transforms.h"
 #include "rig/access.h"
 #include "session/reader.h"
@@ -25,13 +26,11 @@ class Preflight {
     folder_for_writing("recording.folder", config.recording.folder);
     if (!config.alignment.delays.empty())
       folder_for_writing("alignment.delays", config.alignment.delays.parent_path());
-    if (!server.socket.empty()) folder_for_writing("server.socket", server.socket.parent_path());
-    readable("server.tls_certificate", server.tls_certificate);
-    readable("server.tls_clients", server.tls_clients);
-    secret("server.tls_key", server.tls_key);
-    readable("hosts.certificate", config.hosts.certificate);
-    readable("hosts.authority", config.hosts.authority);
-    secret("hosts.key", config.hosts.key);
+    if (!server.socket.empty()) socket(server.socket);
+    tls("server.tls_certificate", server.tls_certificate, "server.tls_key", server.tls_key,
+        "server.tls_clients", server.tls_clients);
+    tls("hosts.certificate", config.hosts.certificate, "hosts.key", config.hosts.key, "hosts.authority",
+        config.hosts.authority);
     if (!server.token_file.empty()) {
       if (const auto token = Token::read(server.token_file); !token)
         problem("server.token_file", server.token_file, token.error().what, token.error().remedy);
@@ -62,18 +61,29 @@ class Preflight {
     }
   }
 
-  std::string readable(const char* key, const fs::path& file, std::size_t largest = kLargestSecret) {
-    if (file.empty()) return {};
-    auto content = read_file(file, largest);
-    if (!content) problem(key, file, content.error().what, "let the daemon's user read it");
-    return content ? std::move(*content) : std::string();
+  void socket(const fs::path& path) {
+    if (const Status fit = SocketLock::check(path); !fit)
+      return problem("server.socket", path, fit.error().what, fit.error().remedy);
+    const fs::path folder = path.parent_path();
+    std::error_code unknown;
+    folder_for_writing("server.socket", fs::is_directory(folder, unknown) ? folder : folder.parent_path());
   }
 
-  std::string secret(const char* key, const fs::path& file) {
-    if (file.empty()) return {};
-    auto content = read_secret_file(file, kLargestSecret, "it");
-    if (!content) problem(key, file, content.error().what, content.error().remedy);
-    return content ? std::move(*content) : std::string();
+  /// Reads them as the start does. Where there is no certificate, it reads none of them.
+  void tls(const char* certificate_key, const fs::path& certificate, const char* key_key, const fs::path& key,
+           const char* authority_key, const fs::path& authority) {
+    if (certificate.empty()) return;
+    if (const auto own = TlsIdentity::read(certificate, key); !own) {
+      const bool is_key = own.error().where == key.string();
+      problem(is_key ? key_key : certificate_key, is_key ? key : certificate, own.error().what,
+              own.error().remedy);
+      // One run names both.
+      const auto secret = read_secret_file(key, kLargestSecret, "the key");
+      if (!is_key && !secret) problem(key_key, key, secret.error().what, secret.error().remedy);
+    }
+    if (authority.empty()) return;
+    if (const auto pem = read_authority(authority); !pem)
+      problem(authority_key, authority, pem.error().what, pem.error().remedy);
   }
 
   void program(const fs::path& path) {

@@ -10,8 +10,8 @@
 namespace emberlock::rig {
 
 /// Problems of a configuration that can be found without opening devices or ports, with the permissions of
-/// the current user: folders that can't be written; certificates, keys, tokens and sessions that can't be
-/// read; secrets that others can read. `where` is the key and its path.
+/// the current user: folders that can't be written; certificates, keys and tokens that the start would
+/// refuse, read by the same functions; sessions that can't be read. `where` is the key and its path.
 std::vector<Error> preflight(const DaemonConfig& config);
 
 /// All problems of a configuration file: those of its text; if there are none, preflight().

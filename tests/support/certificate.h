@@ -15,22 +15,29 @@
 
 namespace emberlock::test {
 
-/// Signs certificates that are good for an hour.
+/// From when until when a certificate is good, in seconds from now; and the bits of an RSA key, 0: P-256.
+struct CertificateKind {
+  long from = -3600, until = 3600;
+  unsigned rsa_bits = 0;
+};
+
+/// Signs certificates, which are good for an hour unless another time is given.
 class CertificateAuthority {
  public:
   explicit CertificateAuthority(const std::string& name = "who vouches in tests")
       : key_(EVP_EC_gen("P-256"), EVP_PKEY_free), own_(nullptr, X509_free) {
-    own_ = make(name, key_.get(), {{NID_basic_constraints, "critical,CA:TRUE"}});
+    own_ = make(name, key_.get(), {{NID_basic_constraints, "critical,CA:TRUE"}}, {});
   }
 
   [[nodiscard]] std::string pem() const { return pem_of(own_.get()); }
   /// For the DNS name or the address `host`, and this machine's address in numbers if that is "localhost".
-  [[nodiscard]] rig::TlsIdentity issue(const std::string& host) const {
-    const Key key(EVP_EC_gen("P-256"), EVP_PKEY_free);
+  [[nodiscard]] rig::TlsIdentity issue(const std::string& host, const CertificateKind& kind = {}) const {
+    const Key key(kind.rsa_bits == 0 ? EVP_EC_gen("P-256") : EVP_RSA_gen(kind.rsa_bits), EVP_PKEY_free);
     const bool address = host.find_first_not_of("0123456789.") == std::string::npos;
     const std::string names =
         (address ? "IP:" : "DNS:") + host + (host == "localhost" ? ",IP:127.0.0.1" : "");
-    return {pem_of(make(host, key.get(), {{NID_subject_alt_name, names.c_str()}}).get()), pem_of(key.get())};
+    return {pem_of(make(host, key.get(), {{NID_subject_alt_name, names.c_str()}}, kind).get()),
+            pem_of(key.get())};
   }
 
  private:
@@ -41,14 +48,14 @@ class CertificateAuthority {
     const char* value;
   };
 
-  Certificate make(const std::string& name, EVP_PKEY* key,
-                   std::initializer_list<Extension> extensions) const {
+  Certificate make(const std::string& name, EVP_PKEY* key, std::initializer_list<Extension> extensions,
+                   const CertificateKind& kind) const {
     Certificate made(X509_new(), X509_free);
     X509* const issuer = own_ ? own_.get() : made.get();
     X509_set_version(made.get(), 2);
     ASN1_INTEGER_set(X509_get_serialNumber(made.get()), ++serial_);
-    X509_gmtime_adj(X509_getm_notBefore(made.get()), -3600);
-    X509_gmtime_adj(X509_getm_notAfter(made.get()), 3600);
+    X509_gmtime_adj(X509_getm_notBefore(made.get()), kind.from);
+    X509_gmtime_adj(X509_getm_notAfter(made.get()), kind.until);
     X509_set_pubkey(made.get(), key);
     X509_NAME_add_entry_by_txt(X509_get_subject_name(made.get()), "CN", MBSTRING_ASC,
                                reinterpret_cast<const unsigned char*>(name.c_str()), -1, -1, 0);

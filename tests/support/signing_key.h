@@ -29,6 +29,8 @@ struct KeyFiles {
     write(private_pem, [&](std::FILE* file) {
       return PEM_write_PrivateKey(file, key.get(), nullptr, nullptr, 0, nullptr, nullptr);
     });
+    std::filesystem::permissions(private_pem,
+                                 std::filesystem::perms::owner_read | std::filesystem::perms::owner_write);
     write(public_pem, [&](std::FILE* file) { return PEM_write_PUBKEY(file, key.get()); });
   }
   KeyFiles(const std::filesystem::path& folder, unsigned char seed) : KeyFiles(folder, filled(seed)) {}

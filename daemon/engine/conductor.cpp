@@ -192,7 +192,8 @@ bool Conductor::waits() const {
 void Conductor::watch_devices() {
   const TimePoint now = parts_.rig.clock().now();
   const bool filmed = watch_.all_film();
-  for (const MachineEvent& event : watch_.cameras(camera_states())) static_cast<void>(happen(event));
+  for (const MachineEvent& event : watch_.cameras(camera_states(), camera_refusals()))
+    static_cast<void>(happen(event));
   for (const MachineEvent& event : watch_.clocks(SteadyClock().now(), wall_clock()))
     static_cast<void>(happen(event));
   watch_.frames(counts(), now);
@@ -252,6 +253,15 @@ std::vector<v1::CameraStatus::State> Conductor::camera_states() const {
   std::vector<v1::CameraStatus::State> states;
   for (std::size_t i = 0; i < parts_.rig.size(); ++i) states.push_back(shown(parts_.rig.state(i)));
   return states;
+}
+
+std::vector<std::optional<Error>> Conductor::camera_refusals() const {
+  std::vector<std::optional<Error>> refusals;
+  for (std::size_t i = 0; i < parts_.rig.size(); ++i) {
+    refusals.push_back(parts_.rig.trouble(i));
+    if (refusals.back() && refusals.back()->kind != ErrorKind::refused) refusals.back().reset();
+  }
+  return refusals;
 }
 
 std::vector<drivers::FrameCounts> Conductor::own_counts() const {

@@ -69,14 +69,14 @@ class Conductor {
   Result<v1::StrobeState> apply_strobe(const v1::StrobeState& wanted);
 
   // What a leading host asks for (hosts.proto).
-  Result<v1::LentCameras> lend(const std::string& leader);
-  Result<std::size_t> lent_camera(const std::string& leader, const std::string& camera_id);
-  Status reset_lent(const v1::ResetRequest& request);
-  Status trim_lent(const v1::TrimRequest& request);
-  Result<v1::HostPart> record_part(const v1::PartRequest& request);
-  Status stop_part(const v1::StopPartRequest& request);
+  Result<v1::LentCameras> lend(const Borrower& leader);
+  Result<std::size_t> lent_camera(const Borrower& leader, const std::string& camera_id);
+  Status reset_lent(const Borrower& leader, const v1::ResetRequest& request);
+  Status trim_lent(const Borrower& leader, const v1::TrimRequest& request);
+  Result<v1::HostPart> record_part(const Borrower& leader, const v1::PartRequest& request);
+  Status stop_part(const Borrower& leader, const v1::StopPartRequest& request);
   /// Error out_of_data: there is none.
-  Result<v1::HostPart> part(const v1::FindPartRequest& request);
+  Result<v1::HostPart> part(const Borrower& leader, const v1::FindPartRequest& request);
 
   // What became of a session in the background.
   void transcoded(const std::string& session, const JobResult& result);
@@ -122,7 +122,7 @@ class Conductor {
   void watch_hosts();
   [[nodiscard]] Status check_not_lent() const;
   /// The cameras are the leader's from now on, if they are free or its own.
-  Status take_loan(const std::string& leader);
+  Status take_loan(const Borrower& leader);
   /// Another host's name for a session may be taken here.
   [[nodiscard]] Result<std::filesystem::path> path_for_part(const std::string& name) const;
   /// A part that is being recorded.
@@ -150,6 +150,8 @@ class Conductor {
   [[nodiscard]] Seconds longest_silence() const;
   void watch_devices();
   void watch_disk();
+  /// Reports what the disk refuses of the recording. Whether it goes on, so that the recording ends.
+  bool watch_refusals();
   void watch_load(TimePoint now);
   /// What the room of simulated cameras shows now.
   void set_scene();
@@ -161,6 +163,8 @@ class Conductor {
   /// Of this host's cameras alone.
   [[nodiscard]] std::vector<drivers::FrameCounts> own_counts() const;
   [[nodiscard]] std::vector<v1::CameraStatus::State> camera_states() const;
+  /// By camera: why it refuses to film, where something else has it.
+  [[nodiscard]] std::vector<std::optional<Error>> camera_refusals() const;
   void remember(const rig::AlignRoundReport& round);
   /// Of the alignment's last round.
   [[nodiscard]] v1::AlignmentStatus::Verdict verdict() const;
@@ -199,6 +203,7 @@ class Conductor {
   std::optional<TimePoint> part_ends_;   ///< as that one said
   TimePoint part_heard_;                 ///< when that one last spoke of it
   bool lit_for_recording_ = false;       ///< the strobe flashes for the recording alone
+  bool disk_refuses_ = false;            ///< what is recorded, for the moment
   Status begun_;                         ///< how the recording asked for last began
   std::filesystem::path record_folder_;
   std::optional<v1::RecordingStatus> recording_;  ///< the last that ended

@@ -167,8 +167,9 @@ void Conductor::film_round() {
   }
   expired_ = false;
   const smear::AlignDecision& last = alignment_->last();
+  const smear::AlignWords& said = alignment_->words();
   static_cast<void>(
-      happen(RoundDone{verdict(), AlignmentSays{alignment_->words().reason}, last.renews, last.in_time}));
+      happen(RoundDone{verdict(), AlignmentSays{said.reason, said.remedy}, last.renews, last.in_time}));
 }
 
 void Conductor::hold() {

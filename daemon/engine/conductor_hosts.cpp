@@ -22,6 +22,18 @@
 namespace emberlock::daemon {
 namespace {
 
+/// Of sessions that are called like a take, at a host that lends.
+constexpr int kMostOfAName = 99;
+
+/// The nth name for a part: the take's, then that with a number, shortened where both would be too long.
+std::string name_of_part(const std::string& name, int n) {
+  std::string stem = session::stored_name(name);
+  if (n == 1) return stem;
+  const std::string number = fmt::format(" {}", n);
+  while (!stem.empty() && !session::check_session_name(stem + number)) stem.pop_back();
+  return stem + number;
+}
+
 /// Staggered cameras' places in the frame period, known to the tolerance that the lock holds.
 void describe_stagger(const rig::Alignment& alignment, v1::Manifest& manifest) {
   if (!smear::staggered(alignment.cameras())) return;
@@ -129,21 +141,21 @@ Status Conductor::check_not_lent() const {
       "Align and record there; five seconds after that emberlockd has ended they are this host's again"};
 }
 
-Status Conductor::take_loan(const std::string& leader) {
+Status Conductor::take_loan(const Borrower& leader) {
   const TimePoint now = SteadyClock().now();
   const std::string before = parts_.loan.leader(now);
   if (before.empty() && state_.phase != v1::IDLE)
     return Error{ErrorKind::refused, "it uses its cameras itself", "emberlockd",
                  "End its alignment and its recording there first"};
-  EMBERLOCK_RETURN_IF_ERROR(session::check_text("leader", leader));
+  EMBERLOCK_RETURN_IF_ERROR(session::check_text("leader", leader.name));
   EMBERLOCK_RETURN_IF_ERROR(parts_.loan.take(leader, now));
-  if (before == leader) return {};
-  parts_.board.notice(v1::GREEN, "The cameras are lent to " + leader);
+  if (before == leader.name) return {};
+  parts_.board.notice(v1::GREEN, "The cameras are lent to " + leader.name);
   set_scene();
   return {};
 }
 
-Result<v1::LentCameras> Conductor::lend(const std::string& leader) {
+Result<v1::LentCameras> Conductor::lend(const Borrower& leader) {
   EMBERLOCK_RETURN_IF_ERROR(take_loan(leader));
   v1::LentCameras lent;
   const auto states = camera_states();
@@ -157,7 +169,7 @@ Result<v1::LentCameras> Conductor::lend(const std::string& leader) {
   return lent;
 }
 
-Result<std::size_t> Conductor::lent_camera(const std::string& leader, const std::string& camera_id) {
+Result<std::size_t> Conductor::lent_camera(const Borrower& leader, const std::string& camera_id) {
   EMBERLOCK_RETURN_IF_ERROR(take_loan(leader));
   for (std::size_t i = 0; i < devices_.cameras.size(); ++i) {
     if (devices_.cameras[i]->info().id != camera_id) continue;
@@ -168,26 +180,26 @@ Result<std::size_t> Conductor::lent_camera(const std::string& leader, const std:
                "Name one that `emberlock status` lists there"};
 }
 
-Status Conductor::reset_lent(const v1::ResetRequest& request) {
+Status Conductor::reset_lent(const Borrower& leader, const v1::ResetRequest& request) {
   EMBERLOCK_RETURN_IF_ERROR(check_instant("at_ns", request.at_ns()));
-  EMBERLOCK_ASSIGN_OR_RETURN(const std::size_t camera, lent_camera(request.leader(), request.camera_id()));
+  EMBERLOCK_ASSIGN_OR_RETURN(const std::size_t camera, lent_camera(leader, request.camera_id()));
   return devices_.cameras[camera]->reset_shutter({request.at_ns()});
 }
 
-Status Conductor::trim_lent(const v1::TrimRequest& request) {
+Status Conductor::trim_lent(const Borrower& leader, const v1::TrimRequest& request) {
   if (!std::isfinite(request.trim_ppm()))
     return Error{ErrorKind::bad_input, "is no number", "trim_ppm", "Give a finite one"};
-  EMBERLOCK_ASSIGN_OR_RETURN(const std::size_t camera, lent_camera(request.leader(), request.camera_id()));
+  EMBERLOCK_ASSIGN_OR_RETURN(const std::size_t camera, lent_camera(leader, request.camera_id()));
   return devices_.cameras[camera]->trim_rate(PartsPerMillion(request.trim_ppm()));
 }
 
 Result<std::filesystem::path> Conductor::path_for_part(const std::string& name) const {
-  constexpr int kMostOfAName = 100;
-  auto path = parts_.store.path_for_new(name, wall_clock());
-  for (int i = 2; i < kMostOfAName && !path.ok() && parts_.store.path_of(name).ok(); ++i) {
-    path = parts_.store.path_for_new(fmt::format("{} {}", name, i), wall_clock());
+  EMBERLOCK_RETURN_IF_ERROR(session::check_session_name(name));
+  for (int n = 1; n <= kMostOfAName; ++n) {
+    auto path = parts_.store.path_for_new(name_of_part(name, n), wall_clock());
+    if (path.ok() || path.error().kind != ErrorKind::bad_input) return path;
   }
-  return path;
+  return parts_.store.path_for_new({}, wall_clock());
 }
 
 v1::HostPart Conductor::running_part() const {
@@ -199,9 +211,9 @@ v1::HostPart Conductor::running_part() const {
   return part;
 }
 
-Result<v1::HostPart> Conductor::record_part(const v1::PartRequest& request) {
+Result<v1::HostPart> Conductor::record_part(const Borrower& leader, const v1::PartRequest& request) {
   EMBERLOCK_RETURN_IF_ERROR(check_part(request));
-  EMBERLOCK_RETURN_IF_ERROR(take_loan(request.leader()));
+  EMBERLOCK_RETURN_IF_ERROR(take_loan(leader));
   part_heard_ = SteadyClock().now();
   // Its answer may have been lost.
   if (records_for_another() && part_->manifest().session_id() == request.manifest().session_id())
@@ -219,8 +231,8 @@ Result<v1::HostPart> Conductor::record_part(const v1::PartRequest& request) {
   return running_part();
 }
 
-Status Conductor::stop_part(const v1::StopPartRequest& request) {
-  EMBERLOCK_RETURN_IF_ERROR(take_loan(request.leader()));
+Status Conductor::stop_part(const Borrower& leader, const v1::StopPartRequest& request) {
+  EMBERLOCK_RETURN_IF_ERROR(take_loan(leader));
   const bool runs = records_for_another() && part_->manifest().session_id() == request.session_id() &&
                     state_.phase == v1::CAPTURING;
   if (!runs) return {};
@@ -229,19 +241,23 @@ Status Conductor::stop_part(const v1::StopPartRequest& request) {
   return happen(AskStopRecording{});
 }
 
-Result<v1::HostPart> Conductor::part(const v1::FindPartRequest& request) {
+Result<v1::HostPart> Conductor::part(const Borrower& leader, const v1::FindPartRequest& request) {
+  EMBERLOCK_ASSIGN_OR_RETURN(const bool has_loan, parts_.loan.hear(leader, SteadyClock().now()));
   if (records_for_another() && part_->manifest().session_id() == request.session_id()) {
-    part_heard_ = SteadyClock().now();
+    if (has_loan) part_heard_ = SteadyClock().now();
     return running_part();
   }
-  const Error none{ErrorKind::out_of_data, "it has no part of this session", request.name(),
-                   "Look for it there"};
-  const auto folder = parts_.store.path_of(request.name());
-  if (!folder.ok()) return none;
-  const auto manifest = session::read_manifest(*folder);
-  if (!manifest.ok()) return manifest.error();
-  if (manifest->session_id() != request.session_id()) return none;
-  return finished_part(*folder, *manifest);
+  Error none{ErrorKind::out_of_data, "it has no part of this session", request.name(), "Look for it there"};
+  // The answer that would have said which of these names it has may have been lost.
+  for (int n = 1; n <= kMostOfAName; ++n) {
+    const auto folder = parts_.store.path_of(name_of_part(request.name(), n));
+    if (!folder.ok()) continue;
+    const auto manifest = session::read_manifest(*folder);
+    if (manifest.ok() && manifest->session_id() == request.session_id())
+      return finished_part(*folder, *manifest);
+    if (!manifest.ok() && n == 1) none = manifest.error();
+  }
+  return none;
 }
 
 v1::Manifest Conductor::describe_take() const {

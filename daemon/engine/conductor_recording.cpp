@@ -17,6 +17,8 @@
 namespace emberlock::daemon {
 namespace {
 
+/// A recording of which the disk refuses every new try for so long ends. The writer tries once a second.
+constexpr Seconds kDiskPatience{5};
 /// A recording without a frame from any camera for so long ends.
 constexpr Seconds kNobodyFilms{10};
 constexpr Seconds kLongestWay{3};  // of frames that were filmed before a recording's end
@@ -238,6 +240,9 @@ void Conductor::finish_recording() {
 }
 
 void Conductor::conclude_recording(v1::RecordingStatus status) {
+  // Before the recorder lets go of the session: then the manifest is written, and its parts aren't listed
+  // here any more. What comes later is news.
+  const std::vector<v1::HostPart> parts = parts_.hosts.of(record_folder_);
   recorder_.reset();
   part_.reset();
   parts_.loan.hold(false);
@@ -252,8 +257,12 @@ void Conductor::conclude_recording(v1::RecordingStatus status) {
     status.set_state(v1::RecordingStatus::FAILED);
     status.set_verdict(words(outcome));
   }
+  // Those that ended the recording stay.
+  if (std::exchange(disk_refuses_, false))
+    static_cast<void>(happen(FaultMended{{v1::Fault::DISK_FAILED, status.session()}}));
   if (spread_) status.set_spread_s(spread_->value());
   if (manifest) *status.mutable_hosts() = manifest->hosts();
+  if (!parts.empty()) status.mutable_hosts()->Assign(parts.begin(), parts.end());
   parts_.jobs.resume();
   // What an end that failed left behind; the other is compressed.
   const rig::RecordingConfig::Transcode transcode = parts_.config.recording.transcode;
@@ -297,11 +306,8 @@ void Conductor::capture() {
   feed_live();
   const TimePoint now = parts_.rig.clock().now();
   const double seconds = record_request_.seconds();
-  if (const auto failure = recorder_->failure()) {
-    static_cast<void>(
-        happen(FaultRaised{{v1::Fault::DISK_FAILED, state_.session}, v1::RED, DiskRefused{*failure}}));
-    static_cast<void>(happen(RecordingEnds{DiskRefused{*failure}}));
-  } else if (part_ && SteadyClock().now() - part_heard_ > Seconds(part_->alone_s())) {
+  if (watch_refusals()) return;
+  if (part_ && SteadyClock().now() - part_heard_ > Seconds(part_->alone_s())) {
     static_cast<void>(happen(RecordingEnds{Why::leader_gone}));
   } else if (seconds > 0 && now - record_began_ >= Seconds(seconds)) {
     static_cast<void>(happen(RecordingEnds{TimeOver{Seconds(seconds)}}));
@@ -314,6 +320,21 @@ void Conductor::capture() {
     expired_ = true;
     static_cast<void>(happen(LockExpired{Why::may_have_drifted}));
   }
+}
+
+bool Conductor::watch_refusals() {
+  const FaultKey key{v1::Fault::DISK_FAILED, state_.session};
+  const auto trouble = recorder_->trouble();
+  if (!trouble) {
+    if (std::exchange(disk_refuses_, false)) static_cast<void>(happen(FaultMended{key}));
+    return false;
+  }
+  const bool ends = trouble->is_final || trouble->lasting >= kDiskPatience;
+  disk_refuses_ = !ends;
+  const DiskRefused refused{trouble->error, !ends};
+  static_cast<void>(happen(FaultRaised{key, ends ? v1::RED : v1::AMBER, refused}));
+  if (ends) static_cast<void>(happen(RecordingEnds{refused}));
+  return ends;
 }
 
 /// Of all cameras together, after which a recording ends.

@@ -155,6 +155,7 @@ v1::DaemonStatus Conductor::status() const {
 
 void Conductor::describe_cameras(v1::DaemonStatus& status) const {
   const auto states = camera_states();
+  const auto refusals = camera_refusals();
   const TimePoint now = parts_.rig.clock().now();
   for (std::size_t i = 0; i < devices_.cameras.size(); ++i) {
     const drivers::CameraInfo& info = devices_.cameras[i]->info();
@@ -190,7 +191,7 @@ void Conductor::describe_cameras(v1::DaemonStatus& status) const {
     if (states[i] == v1::CameraStatus::FILMING) describe_frames(camera);
     if (states[i] == v1::CameraStatus::LOST || states[i] == v1::CameraStatus::QUARANTINED) {
       camera.set_light(v1::RED);
-      camera.set_reason(words(states[i]));
+      camera.set_reason(refusals[i] ? refusals[i]->message() : words(states[i]));
     }
     if (states[i] == v1::CameraStatus::ENDED) {
       camera.set_light(v1::AMBER);

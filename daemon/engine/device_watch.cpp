@@ -26,15 +26,24 @@ MachineEvent mended(State::State state, const std::string& id) {
 DeviceWatch::DeviceWatch(std::vector<std::string> camera_ids)
     : ids_(std::move(camera_ids)),
       states_(ids_.size(), State::FILMING),
+      refusals_(ids_.size()),
       rates_(ids_.size(), 0.0),
       came_(ids_.size(), 0) {}
 
-std::vector<MachineEvent> DeviceWatch::cameras(const std::vector<v1::CameraStatus::State>& states) {
+std::vector<MachineEvent> DeviceWatch::cameras(const std::vector<v1::CameraStatus::State>& states,
+                                               const std::vector<std::optional<Error>>& refusals) {
   std::vector<MachineEvent> events;
   for (std::size_t i = 0; i < states.size(); ++i) {
-    if (states[i] == states_[i]) continue;
-    if (gone(states_[i])) events.push_back(mended(states_[i], ids_[i]));
-    if (gone(states[i])) events.push_back(raised(states[i], ids_[i]));
+    const bool refuses = states[i] == State::LOST && i < refusals.size() && refusals[i];
+    const std::string refusal = refuses ? refusals[i]->what : std::string();
+    const bool is_news = std::exchange(refusals_[i], refusal) != refusal;
+    if (states[i] == states_[i] && !(is_news && gone(states[i]))) continue;
+    if (states[i] != states_[i] && gone(states_[i])) events.push_back(mended(states_[i], ids_[i]));
+    if (refuses) {
+      events.emplace_back(FaultRaised{{v1::Fault::CAMERA_LOST, ids_[i]}, v1::RED, *refusals[i]});
+    } else if (gone(states[i])) {
+      events.push_back(raised(states[i], ids_[i]));
+    }
     if (states[i] == State::ENDED) events.emplace_back(CameraEnded{ids_[i]});
   }
   states_ = states;

@@ -23,7 +23,9 @@ class DeviceWatch {
 
   explicit DeviceWatch(std::vector<std::string> camera_ids);
 
-  std::vector<MachineEvent> cameras(const std::vector<v1::CameraStatus::State>& states);
+  /// `refusals`: by camera, why one that is lost refuses to film, which isn't an absence; empty: none does.
+  std::vector<MachineEvent> cameras(const std::vector<v1::CameraStatus::State>& states,
+                                    const std::vector<std::optional<Error>>& refusals = {});
   std::vector<MachineEvent> strobe(const std::string& id, const Status& answer);
   std::vector<MachineEvent> clocks(TimePoint monotonic, TimePoint wall);
   void frames(const std::vector<drivers::FrameCounts>& counts, TimePoint now);
@@ -36,6 +38,7 @@ class DeviceWatch {
  private:
   std::vector<std::string> ids_;
   std::vector<v1::CameraStatus::State> states_;
+  std::vector<std::string> refusals_;  ///< by camera, as they were reported last
   bool all_lost_ = false;
   std::optional<std::string> strobe_trouble_;  ///< as it was told last
   std::optional<Seconds> wall_ahead_;

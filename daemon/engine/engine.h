@@ -80,14 +80,15 @@ class Engine final : public Api, public Lender {
   Result<v1::ArStatus> start_ar(const v1::ArRequest& request) override;
   Result<v1::ArStatus> stop_ar() override { return ar_->stop(); }
 
-  Result<v1::LentCameras> lend(const std::string& leader) override;
-  void hear(const std::string& leader) override;
-  Result<std::shared_ptr<LentFrames>> watch(const v1::FramesRequest& request) override;
-  Status reset(const v1::ResetRequest& request) override;
-  Status trim(const v1::TrimRequest& request) override;
-  Result<v1::HostPart> record_part(const v1::PartRequest& request) override;
-  Status stop_part(const v1::StopPartRequest& request) override;
-  Result<v1::HostPart> part(const v1::FindPartRequest& request) override;
+  Result<v1::LentCameras> lend(const Borrower& leader) override;
+  Status hear(const Borrower& leader) override;
+  Result<std::shared_ptr<LentFrames>> watch(const Borrower& leader,
+                                            const v1::FramesRequest& request) override;
+  Status reset(const Borrower& leader, const v1::ResetRequest& request) override;
+  Status trim(const Borrower& leader, const v1::TrimRequest& request) override;
+  Result<v1::HostPart> record_part(const Borrower& leader, const v1::PartRequest& request) override;
+  Status stop_part(const Borrower& leader, const v1::StopPartRequest& request) override;
+  Result<v1::HostPart> part(const Borrower& leader, const v1::FindPartRequest& request) override;
 
  private:
   enum class Urgency {

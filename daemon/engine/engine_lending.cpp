@@ -5,40 +5,47 @@
 
 namespace emberlock::daemon {
 
-Result<v1::LentCameras> Engine::lend(const std::string& leader) {
+Result<v1::LentCameras> Engine::lend(const Borrower& leader) {
   return on_thread<Result<v1::LentCameras>>(Urgency::waits,
                                             [leader](Conductor& c) { return c.lend(leader); });
 }
 
-void Engine::hear(const std::string& leader) { loan_.hear(leader, SteadyClock().now()); }
+Status Engine::hear(const Borrower& leader) {
+  EMBERLOCK_RETURN_IF_ERROR(loan_.hear(leader, SteadyClock().now()));
+  return {};
+}
 
-Result<std::shared_ptr<LentFrames>> Engine::watch(const v1::FramesRequest& request) {
+Result<std::shared_ptr<LentFrames>> Engine::watch(const Borrower& leader, const v1::FramesRequest& request) {
   EMBERLOCK_ASSIGN_OR_RETURN(const std::size_t camera,
-                             on_thread<Result<std::size_t>>(Urgency::waits, [request](Conductor& c) {
-                               return c.lent_camera(request.leader(), request.camera_id());
+                             on_thread<Result<std::size_t>>(Urgency::waits, [leader, request](Conductor& c) {
+                               return c.lent_camera(leader, request.camera_id());
                              }));
   return loan_.watch(camera);
 }
 
-Status Engine::reset(const v1::ResetRequest& request) {
-  return on_thread<Status>(Urgency::waits, [request](Conductor& c) { return c.reset_lent(request); });
+Status Engine::reset(const Borrower& leader, const v1::ResetRequest& request) {
+  return on_thread<Status>(Urgency::waits,
+                           [leader, request](Conductor& c) { return c.reset_lent(leader, request); });
 }
 
-Status Engine::trim(const v1::TrimRequest& request) {
-  return on_thread<Status>(Urgency::waits, [request](Conductor& c) { return c.trim_lent(request); });
+Status Engine::trim(const Borrower& leader, const v1::TrimRequest& request) {
+  return on_thread<Status>(Urgency::waits,
+                           [leader, request](Conductor& c) { return c.trim_lent(leader, request); });
 }
 
-Result<v1::HostPart> Engine::record_part(const v1::PartRequest& request) {
+Result<v1::HostPart> Engine::record_part(const Borrower& leader, const v1::PartRequest& request) {
+  return on_thread<Result<v1::HostPart>>(
+      Urgency::waits, [leader, request](Conductor& c) { return c.record_part(leader, request); });
+}
+
+Status Engine::stop_part(const Borrower& leader, const v1::StopPartRequest& request) {
+  return on_thread<Status>(Urgency::waits,
+                           [leader, request](Conductor& c) { return c.stop_part(leader, request); });
+}
+
+Result<v1::HostPart> Engine::part(const Borrower& leader, const v1::FindPartRequest& request) {
   return on_thread<Result<v1::HostPart>>(Urgency::waits,
-                                         [request](Conductor& c) { return c.record_part(request); });
-}
-
-Status Engine::stop_part(const v1::StopPartRequest& request) {
-  return on_thread<Status>(Urgency::waits, [request](Conductor& c) { return c.stop_part(request); });
-}
-
-Result<v1::HostPart> Engine::part(const v1::FindPartRequest& request) {
-  return on_thread<Result<v1::HostPart>>(Urgency::waits, [request](Conductor& c) { return c.part(request); });
+                                         [leader, request](Conductor& c) { return c.part(leader, request); });
 }
 
 }  // namespace emberlock::daemon

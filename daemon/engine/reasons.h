@@ -57,6 +57,7 @@ struct ReconstructionOf {
 /// What the alignment says of its last round.
 struct AlignmentSays {
   std::string text;
+  std::string remedy = {};  ///< of a run that is refused or given up
 };
 struct TimeOver {
   Seconds length;
@@ -67,6 +68,7 @@ struct NoFrames {
 };
 struct DiskRefused {
   Error error;
+  bool retried = false;  ///< the recording goes on
 };
 /// What became of a recording.
 struct Outcome {

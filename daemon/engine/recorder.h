@@ -68,8 +68,8 @@ class Recorder {
   /// Whether a frame has come that this camera filmed after the end.
   [[nodiscard]] bool has_all(std::size_t camera) const { return past_end_[camera]; }
   Status append(const v1::Event& event) { return writer_.append(event); }
-  /// The disk's first refusal: nothing that comes later is sure to be kept.
-  [[nodiscard]] std::optional<Error> failure() const { return writer_.failure(); }
+  /// What the disk refuses now; writing is tried again.
+  [[nodiscard]] std::optional<session::DiskTrouble> trouble() const { return writer_.trouble(); }
   [[nodiscard]] v1::RecordingStatus status(TimePoint now) const;
   [[nodiscard]] session::WriterLoad load() const { return writer_.load(); }
   [[nodiscard]] RecordedNow now() const;

@@ -105,6 +105,10 @@ const char* relief(Bottleneck what) {
   return "";
 }
 
+std::string words_of_refusal(const DiskRefused& refused) {
+  return refused.error.what + (refused.retried ? "; writing is tried again every second" : "");
+}
+
 struct ReasonSentence {
   std::string operator()(Why why) const { return sentence(why); }
   std::string operator()(const Error& error) const { return error.message(); }
@@ -118,7 +122,7 @@ struct ReasonSentence {
     return fmt::format("no frame has come from any camera for {:.0f} s{}", it.silence.value(),
                        and_why(it.cameras));
   }
-  std::string operator()(const DiskRefused& it) const { return "the disk refused: " + it.error.what; }
+  std::string operator()(const DiskRefused& it) const { return "the disk refused: " + words_of_refusal(it); }
   std::string operator()(const Outcome& it) const {
     if (it.code != Outcome::Code::nothing) return it.verdict;
     return "not one frame came from any camera" + and_why(it.cameras);
@@ -157,6 +161,7 @@ std::string remedy_of_lost_lock(const Reason& reason) {
 /// What whoever refused says.
 std::string own_remedy(const Reason& reason) {
   if (const auto* refused = std::get_if<DiskRefused>(&reason)) return refused->error.remedy;
+  if (const auto* alignment = std::get_if<AlignmentSays>(&reason)) return alignment->remedy;
   const Error* error = std::get_if<Error>(&reason);
   return error == nullptr ? "" : error->remedy;
 }
@@ -275,7 +280,7 @@ Error words(const MachineRefusal& refusal) {
 }
 
 std::string words(v1::Fault::Kind kind, const Reason& reason) {
-  if (const auto* refused = std::get_if<DiskRefused>(&reason)) return refused->error.what;
+  if (const auto* refused = std::get_if<DiskRefused>(&reason)) return words_of_refusal(*refused);
   const Error* error = std::get_if<Error>(&reason);
   if (error == nullptr) return words(reason);
   switch (kind) {  // whom it concerns is told beside it
@@ -294,6 +299,8 @@ std::string remedy(v1::Fault::Kind kind, const Reason& reason) {
   std::string own = own_remedy(reason);
   switch (kind) {
     case v1::Fault::CAMERA_LOST:
+      if (std::holds_alternative<Error>(reason))  // it is there, and refuses
+        return or_else(own, "It is taken up by itself once it is free");
       return "See to its cable and its power: it is taken up again by itself";
     case v1::Fault::CAMERA_HANGS:
       return "Unplug it and plug it in again; if that doesn't help, restart emberlockd";
@@ -302,7 +309,7 @@ std::string remedy(v1::Fault::Kind kind, const Reason& reason) {
     case v1::Fault::STROBE_SILENT:
       return or_else(own, "See to its power and its cable: it is asked again every second");
     case v1::Fault::NOT_ALIGNED:
-      return "Ask for a wider tolerance (those that can be met are listed), or check the cameras named";
+      return or_else(own, "Check the cameras named, then align again");
     case v1::Fault::LOCK_LOST:
       return remedy_of_lost_lock(reason);
     case v1::Fault::FRAMES_LOST:

@@ -4,6 +4,7 @@
 #include <chrono>
 #include <utility>
 
+#include <grpc/grpc_security_constants.h>
 #include <grpcpp/grpcpp.h>
 
 #include "base/clock.h"
@@ -19,23 +20,30 @@ constexpr Seconds kLook = milliseconds(200);  // for a leader that is gone
 constexpr int kAliveEveryMs = 2000;
 constexpr int kLargestQuestion = 16 << 20;  // the colours of 64 cameras
 
+/// The name is the request's; the certificate is the connection's, which gRPC has verified.
+template <class Request>
+Borrower leader_of(const grpc::ServerContext& context, const Request& request) {
+  const auto certificate = context.auth_context()->FindPropertyValues(GRPC_X509_PEM_CERT_PROPERTY_NAME);
+  return {request.leader(),
+          certificate.empty() ? std::string() : std::string(certificate[0].data(), certificate[0].size())};
+}
+
 class LendingService final : public v1::Lending::Service {
  public:
   explicit LendingService(Lender& lender) : lender_(lender) {}
 
-  grpc::Status Borrow(grpc::ServerContext* /*context*/, const v1::LeaderRequest* request,
+  grpc::Status Borrow(grpc::ServerContext* context, const v1::LeaderRequest* request,
                       v1::LentCameras* cameras) override {
-    return put(lender_.lend(request->leader()), *cameras);
+    return put(lender_.lend(leader_of(*context, *request)), *cameras);
   }
-  grpc::Status Clock(grpc::ServerContext* /*context*/, const v1::LeaderRequest* request,
+  grpc::Status Clock(grpc::ServerContext* context, const v1::LeaderRequest* request,
                      v1::HostClock* clock) override {
     clock->set_monotonic_ns(SteadyClock().now().ns);
-    lender_.hear(request->leader());
-    return grpc::Status::OK;
+    return grpc_status(lender_.hear(leader_of(*context, *request)));
   }
   grpc::Status Frames(grpc::ServerContext* context, const v1::FramesRequest* request,
                       grpc::ServerWriter<v1::LentFrame>* stream) override {
-    const auto frames = lender_.watch(*request);
+    const auto frames = lender_.watch(leader_of(*context, *request), *request);
     if (!frames) return grpc_status(frames.error());
     while (!context->IsCancelled()) {
       auto next = (*frames)->next(kLook);
@@ -44,26 +52,26 @@ class LendingService final : public v1::Lending::Service {
     }
     return grpc::Status::OK;
   }
-  grpc::Status Reset(grpc::ServerContext* /*context*/, const v1::ResetRequest* request,
+  grpc::Status Reset(grpc::ServerContext* context, const v1::ResetRequest* request,
                      v1::Empty* /*done*/) override {
-    return grpc_status(lender_.reset(*request));
+    return grpc_status(lender_.reset(leader_of(*context, *request), *request));
   }
-  grpc::Status Trim(grpc::ServerContext* /*context*/, const v1::TrimRequest* request,
+  grpc::Status Trim(grpc::ServerContext* context, const v1::TrimRequest* request,
                     v1::Empty* /*done*/) override {
-    return grpc_status(lender_.trim(*request));
+    return grpc_status(lender_.trim(leader_of(*context, *request), *request));
   }
   grpc::Status Record(grpc::ServerContext* context, const v1::PartRequest* request,
                       v1::HostPart* part) override {
     if (context->IsCancelled()) return grpc::Status::CANCELLED;  // its leader doesn't wait any more
-    return put(lender_.record_part(*request), *part);
+    return put(lender_.record_part(leader_of(*context, *request), *request), *part);
   }
-  grpc::Status StopPart(grpc::ServerContext* /*context*/, const v1::StopPartRequest* request,
+  grpc::Status StopPart(grpc::ServerContext* context, const v1::StopPartRequest* request,
                         v1::Empty* /*done*/) override {
-    return grpc_status(lender_.stop_part(*request));
+    return grpc_status(lender_.stop_part(leader_of(*context, *request), *request));
   }
-  grpc::Status Part(grpc::ServerContext* /*context*/, const v1::FindPartRequest* request,
+  grpc::Status Part(grpc::ServerContext* context, const v1::FindPartRequest* request,
                     v1::HostPart* part) override {
-    auto found = lender_.part(*request);
+    auto found = lender_.part(leader_of(*context, *request), *request);
     if (!found && found.error().kind == ErrorKind::out_of_data)
       return {grpc::StatusCode::NOT_FOUND, found.error().message()};
     return put(std::move(found), *part);

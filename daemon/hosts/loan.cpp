@@ -37,22 +37,34 @@ Result<std::optional<v1::LentFrame>> LentFrames::next(Seconds wait) {
   return std::optional(to_proto(next.frame, next.counts));
 }
 
-Status Loan::take(const std::string& leader, TimePoint now) {
-  if (leader.empty()) return Error{ErrorKind::bad_input, "the leader has no name", "leader", "Say who leads"};
+Status Loan::check(const Borrower& borrower, TimePoint now) const {
+  if (borrower_.name.empty() || borrower_ == borrower || lapsed(now)) return {};
+  if (borrower_.name == borrower.name)
+    return Error{ErrorKind::refused,
+                 "its cameras are lent to another host that is called " + borrower.name + " too",
+                 "emberlockd",
+                 "Give one of both rigs another name in [rig], or end the emberlockd that has the cameras"};
+  return Error{ErrorKind::refused, "its cameras are lent to " + borrower_.name, "emberlockd",
+               "End that one, or wait until it lets go of them: five seconds after it ended, or when what it "
+               "records has ended"};
+}
+
+Status Loan::take(const Borrower& borrower, TimePoint now) {
+  if (borrower.name.empty())
+    return Error{ErrorKind::bad_input, "the leader has no name", "leader", "Say who leads"};
   const std::lock_guard lock(mutex_);
-  if (!leader_.empty() && leader_ != leader && !lapsed(now))
-    return Error{
-        ErrorKind::refused, "its cameras are lent to " + leader_, "emberlockd",
-        "End that one, or wait until it lets go of them: five seconds after it ended, or when what it "
-        "records has ended"};
-  leader_ = leader;
+  EMBERLOCK_RETURN_IF_ERROR(check(borrower, now));
+  borrower_ = borrower;
   heard_ = now;
   return {};
 }
 
-void Loan::hear(const std::string& leader, TimePoint now) {
+Result<bool> Loan::hear(const Borrower& borrower, TimePoint now) {
   const std::lock_guard lock(mutex_);
-  if (!leader.empty() && leader == leader_ && !lapsed(now)) heard_ = now;
+  if (borrower.name.empty() || borrower.name != borrower_.name || lapsed(now)) return false;
+  EMBERLOCK_RETURN_IF_ERROR(check(borrower, now));
+  heard_ = now;
+  return true;
 }
 
 void Loan::hold(bool held) {
@@ -62,7 +74,7 @@ void Loan::hold(bool held) {
 
 std::string Loan::leader(TimePoint now) const {
   const std::lock_guard lock(mutex_);
-  return lapsed(now) ? std::string() : leader_;
+  return lapsed(now) ? std::string() : borrower_.name;
 }
 
 std::shared_ptr<LentFrames> Loan::watch(std::size_t camera) {

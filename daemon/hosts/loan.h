@@ -40,8 +40,16 @@ class LentFrames {
   std::optional<Error> ended_;
 };
 
-/// Which leader has this host's cameras, and what it watches. A loan lapses when nothing was heard of its
-/// leader for kPatience, but not while something is recorded for it. Thread-safe.
+/// A host that leads, or wants to: the name that it gives, and the certificate (PEM) that proves who it is.
+struct Borrower {
+  std::string name;
+  std::string certificate;
+  friend bool operator==(const Borrower&, const Borrower&) = default;
+};
+
+/// Which leader has this host's cameras, and what it watches. A loan belongs to the leader's certificate:
+/// another host that gives the same name is refused. A loan lapses when nothing was heard of its leader for
+/// kPatience, but not while something is recorded for it. Thread-safe.
 class Loan {
  public:
   static constexpr Seconds kPatience{5};
@@ -49,9 +57,10 @@ class Loan {
   explicit Loan(std::size_t cameras) : watched_(cameras) {}
 
   /// Heard of a leader that wants the cameras, or has them. Error refused: another one has them.
-  Status take(const std::string& leader, TimePoint now);
-  /// Heard of one that asks for the clock alone.
-  void hear(const std::string& leader, TimePoint now);
+  Status take(const Borrower& borrower, TimePoint now);
+  /// Heard of one that only asks for the clock or for a part: whether the cameras are lent to it. Error
+  /// refused: they are lent to another one of its name.
+  Result<bool> hear(const Borrower& borrower, TimePoint now);
   /// Whether something is recorded for the leader.
   void hold(bool held);
   /// Empty: nobody.
@@ -65,8 +74,11 @@ class Loan {
  private:
   [[nodiscard]] bool lapsed(TimePoint now) const { return !held_ && now - heard_ > kPatience; }
 
+  /// Requires the lock. Error refused: another one has the cameras.
+  [[nodiscard]] Status check(const Borrower& borrower, TimePoint now) const;
+
   mutable std::mutex mutex_;
-  std::string leader_;
+  Borrower borrower_;
   TimePoint heard_;
   bool held_ = false;
   std::vector<std::weak_ptr<LentFrames>> watched_;  ///< by camera

@@ -7,7 +7,6 @@
 #include <grpcpp/create_channel.h>
 #include <grpcpp/security/credentials.h>
 
-#include "base/file.h"
 #include "rig/access.h"
 
 namespace emberlock::daemon {
@@ -35,8 +34,7 @@ std::string said(Error error) {
 Result<std::shared_ptr<grpc::Channel>> channel_to(const std::string& address, const rig::HostsConfig& hosts) {
   EMBERLOCK_ASSIGN_OR_RETURN(const rig::TlsIdentity own,
                              rig::TlsIdentity::read(hosts.certificate, hosts.key));
-  constexpr std::size_t kLargestPem = 1 << 20;
-  EMBERLOCK_ASSIGN_OR_RETURN(const std::string authority, read_file(hosts.authority, kLargestPem));
+  EMBERLOCK_ASSIGN_OR_RETURN(const std::string authority, rig::read_authority(hosts.authority));
   grpc::SslCredentialsOptions ssl;
   ssl.pem_root_certs = authority;
   ssl.pem_private_key = own.key;

@@ -318,6 +318,32 @@ std::string verdict_words(const Facts& facts) {
   return "not aligned after " + plural(static_cast<std::size_t>(rounds), "round") + ": " + text;
 }
 
+/// The one thing to do next, by what ended the run.
+std::string remedy_words(const Facts& facts) {
+  const AlignReason& why = facts.decision.reason;
+  switch (why.cause) {
+    case AlignCause::untrimmable:
+      return "Ask for the timed policy";
+    case AlignCause::untellable:
+      return "Ask for a wider tolerance, or let the flash be about a row long";
+    case AlignCause::too_costly:
+      return facts.decision.offers.empty() ? "Allow more resets or time"
+                                           : "Ask for a tolerance that can be met: the reason lists them";
+    case AlignCause::stuck:
+      return "Make that camera the reference, or ask for a wider tolerance";
+    case AlignCause::unmoved:
+      if (why.unmoved.empty())
+        return "Ask for a finer tolerance, or give the cameras named more of the flash";
+      return "Check the view that the cameras named have of the lamp, then align again";
+    case AlignCause::unseen:
+    case AlignCause::looks_again:
+    case AlignCause::waits_for_away:
+      return "Check the cameras named and the lamp, then align again";
+    default:
+      return "Check the cameras that are out of tolerance, or ask for a wider one";
+  }
+}
+
 }  // namespace
 
 std::string words(Seconds time) {
@@ -332,6 +358,8 @@ AlignWords words(const AlignDecision& decision, const AlignRound& round,
   const Facts facts{decision, round, cameras, options};
   AlignWords all;
   all.reason = verdict_words(facts);
+  if (decision.verdict == AlignVerdict::refused || decision.verdict == AlignVerdict::given_up)
+    all.remedy = remedy_words(facts);
   for (std::size_t i = 0; i < decision.cameras.size(); ++i) all.cameras.push_back(camera_words(facts, i));
   all.dial = dial_words(decision, cameras, options);
   return all;

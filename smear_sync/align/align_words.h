@@ -16,6 +16,7 @@ std::string words(Seconds time);
 /// What is said of a round's decision.
 struct AlignWords {
   std::string reason;                ///< of the verdict, or what the rig waits for
+  std::string remedy;                ///< of a run that is refused or given up, in keeping with the reason
   std::vector<std::string> cameras;  ///< by camera: what an operator can act on
   std::string dial;                  ///< to whoever sets the strobe by a dial, or what was seen of it
 };

@@ -14,6 +14,7 @@ namespace {
 using Shown = v1::CameraStatus;
 using ::testing::DoubleNear;
 using ::testing::ElementsAre;
+using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 using ::testing::Not;
 
@@ -53,6 +54,23 @@ TEST_F(Watching, ACameraThatGoesAndComesBackIsToldOnceEachTime) {
   EXPECT_THAT(cameras({Shown::FILMING, Shown::FILMING}), ElementsAre("mended CAMERA_LOST left"));
   EXPECT_THAT(cameras({Shown::FILMING, Shown::FILMING}), IsEmpty());
   EXPECT_TRUE(watch_.all_film());
+}
+
+TEST_F(Watching, ACameraThatRefusesSaysSoInItsOwnWords) {
+  const Error lent{ErrorKind::refused, "its cameras are lent to arc at lab-9", "host lab-2"};
+  const std::vector<Shown::State> lost{Shown::LOST, Shown::FILMING};
+  const auto refused = [&](const std::optional<Error>& why) {
+    return watch_.cameras(lost, {why, std::nullopt});
+  };
+  EXPECT_THAT(in_short(refused(std::nullopt)), ElementsAre("raised CAMERA_LOST left"));
+  const auto events = refused(lent);
+  EXPECT_THAT(in_short(events), ElementsAre("raised CAMERA_LOST left")) << "with another reason";
+  const auto& raised = std::get<FaultRaised>(events.at(0));
+  EXPECT_EQ(words(v1::Fault::CAMERA_LOST, raised.reason), lent.message());
+  EXPECT_THAT(remedy(v1::Fault::CAMERA_LOST, raised.reason), Not(HasSubstr("cable")));
+  EXPECT_THAT(refused(lent), IsEmpty());
+  EXPECT_THAT(in_short(refused(std::nullopt)), ElementsAre("raised CAMERA_LOST left"));
+  EXPECT_THAT(cameras({Shown::FILMING, Shown::FILMING}), ElementsAre("mended CAMERA_LOST left"));
 }
 
 TEST_F(Watching, ALostCameraThatComesBackHangingIsAnotherFault) {

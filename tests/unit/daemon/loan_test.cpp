@@ -11,8 +11,8 @@ namespace {
 
 using ::testing::HasSubstr;
 
-const std::string kDome = "dome at lab-1";
-const std::string kOther = "arc at lab-9";
+const Borrower kDome{"dome at lab-1", "certificate 1"};
+const Borrower kOther{"arc at lab-9", "certificate 9"};
 TimePoint at(double s) { return {static_cast<std::int64_t>(s * 1e9)}; }
 
 Frame frame(std::uint64_t id, double t, PixelFormat format = PixelFormat::gray8, int depth = 8) {
@@ -26,33 +26,57 @@ TEST(Loan, IsOneLeadersUntilNothingIsHeardOfItForAWhile) {
   Loan loan(1);
   EXPECT_EQ(loan.leader(at(1)), "");
   ASSERT_TRUE(loan.take(kDome, at(1)).ok());
-  EXPECT_EQ(loan.leader(at(5.9)), kDome);
+  EXPECT_EQ(loan.leader(at(5.9)), kDome.name);
   const Status refused = loan.take(kOther, at(5.9));
   ASSERT_FALSE(refused.ok());
   EXPECT_EQ(refused.error().kind, ErrorKind::refused);
-  EXPECT_THAT(refused.error().what, HasSubstr(kDome));
-  loan.hear(kDome, at(5.9));
-  EXPECT_EQ(loan.leader(at(10.8)), kDome);
+  EXPECT_THAT(refused.error().what, HasSubstr(kDome.name));
+  EXPECT_TRUE(loan.hear(kDome, at(5.9)).value());
+  EXPECT_EQ(loan.leader(at(10.8)), kDome.name);
   EXPECT_EQ(loan.leader(at(11)), "");
   EXPECT_TRUE(loan.take(kOther, at(11)).ok());
-  EXPECT_EQ(loan.leader(at(11)), kOther);
+  EXPECT_EQ(loan.leader(at(11)), kOther.name);
 }
 
 TEST(Loan, WhoIsntTheLeaderIsntHeard) {
   Loan loan(1);
-  loan.hear(kDome, at(1));
+  EXPECT_FALSE(loan.hear(kDome, at(1)).value());
   EXPECT_EQ(loan.leader(at(1)), "");
   ASSERT_TRUE(loan.take(kDome, at(1)).ok());
-  loan.hear(kOther, at(5));
+  EXPECT_FALSE(loan.hear(kOther, at(5)).value());
   EXPECT_EQ(loan.leader(at(7)), "");
-  EXPECT_EQ(loan.take("", at(8)).error().kind, ErrorKind::bad_input);
+  EXPECT_EQ(loan.take({"", "certificate"}, at(8)).error().kind, ErrorKind::bad_input);
+}
+
+/// All pairs of who has the cameras and who comes, at times before and after the loan lapses: it goes to
+/// another certificate only once it has lapsed, whatever name that one gives.
+TEST(Loan, BelongsToACertificateAndNotToAName) {
+  const std::vector<Borrower> hosts{
+      kDome, {kDome.name, "certificate 2"}, {kOther.name, "certificate 1"}, kOther};
+  for (const Borrower& has : hosts)
+    for (const Borrower& comes : hosts)
+      for (const bool records : {false, true})
+        for (const double t : {2.0, 30.0}) {
+          Loan loan(1);
+          ASSERT_TRUE(loan.take(has, at(1)).ok());
+          loan.hold(records);
+          const bool lapsed = t > 6 && !records;
+          const std::string row = has.certificate + ", " + comes.name + " by " + comes.certificate;
+          const bool twin = has.name == comes.name && !(has == comes);
+          const auto heard = loan.hear(comes, at(t));
+          EXPECT_EQ(heard.ok(), lapsed || !twin) << row;
+          if (heard.ok()) EXPECT_EQ(*heard, has == comes && !lapsed) << row;
+          const Status taken = loan.take(comes, at(t));
+          EXPECT_EQ(taken.ok(), lapsed || has == comes) << row;
+          if (!taken.ok() && twin) EXPECT_THAT(taken.error().message(), HasSubstr("[rig]")) << row;
+        }
 }
 
 TEST(Loan, WhileItRecordsItDoesntLapse) {
   Loan loan(1);
   ASSERT_TRUE(loan.take(kDome, at(1)).ok());
   loan.hold(true);
-  EXPECT_EQ(loan.leader(at(500)), kDome);
+  EXPECT_EQ(loan.leader(at(500)), kDome.name);
   EXPECT_FALSE(loan.take(kOther, at(500)).ok());
   EXPECT_TRUE(loan.take(kDome, at(501)).ok()) << "it comes back";
   loan.hold(false);

@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <fstream>
 #include <mutex>
+#include <set>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -38,9 +39,10 @@ Frame lent_frame(std::uint64_t id, TimePoint at = SteadyClock().now()) {
 /// A host with one camera, "cam", that does what it is told.
 class FakeLender final : public Lender {
  public:
-  Result<v1::LentCameras> lend(const std::string& leader) override {
+  Result<v1::LentCameras> lend(const Borrower& leader) override {
     const std::lock_guard lock(mutex);
-    asked_by = leader;
+    asked_by = leader.name;
+    if (!leader.certificate.empty()) certificates.insert(leader.certificate);
     v1::LentCameras cameras;
     v1::LentCameras::Camera& camera = *cameras.add_cameras();
     *camera.mutable_stream() = drivers::to_proto({.id = "cam",
@@ -51,23 +53,24 @@ class FakeLender final : public Lender {
     camera.set_state(films ? v1::CameraStatus::FILMING : v1::CameraStatus::LOST);
     return cameras;
   }
-  void hear(const std::string& /*leader*/) override {}
-  Result<std::shared_ptr<LentFrames>> watch(const v1::FramesRequest& /*request*/) override {
+  Status hear(const Borrower& /*leader*/) override { return {}; }
+  Result<std::shared_ptr<LentFrames>> watch(const Borrower& /*leader*/,
+                                            const v1::FramesRequest& /*request*/) override {
     auto frames = loan.watch(0);
     ++watches;
     return frames;
   }
-  Status reset(const v1::ResetRequest& request) override {
+  Status reset(const Borrower& /*leader*/, const v1::ResetRequest& request) override {
     const std::lock_guard lock(mutex);
     resets.push_back(request);
     return {};
   }
-  Status trim(const v1::TrimRequest& request) override {
+  Status trim(const Borrower& /*leader*/, const v1::TrimRequest& request) override {
     const std::lock_guard lock(mutex);
     trim_ppm = request.trim_ppm();
     return {};
   }
-  Result<v1::HostPart> record_part(const v1::PartRequest& request) override {
+  Result<v1::HostPart> record_part(const Borrower& /*leader*/, const v1::PartRequest& request) override {
     const std::lock_guard lock(mutex);
     if (refuses) return Error{ErrorKind::refused, "its disk is full", "emberlockd", "Free space"};
     recorded = request;
@@ -77,7 +80,7 @@ class FakeLender final : public Lender {
     if (loses_answers) return Error{ErrorKind::io, "its answer was lost"};
     return part_now;
   }
-  Status stop_part(const v1::StopPartRequest& request) override {
+  Status stop_part(const Borrower& /*leader*/, const v1::StopPartRequest& request) override {
     const std::lock_guard lock(mutex);
     stopped = request;
     part_now.set_state(v1::HostPart::WHOLE);
@@ -85,7 +88,7 @@ class FakeLender final : public Lender {
     part_now.set_until_ns(request.at_ns() - early_ns);
     return {};
   }
-  Result<v1::HostPart> part(const v1::FindPartRequest& request) override {
+  Result<v1::HostPart> part(const Borrower& /*leader*/, const v1::FindPartRequest& request) override {
     const std::lock_guard lock(mutex);
     if (loses_answers) return Error{ErrorKind::io, "its answer was lost"};
     if (!recorded || recorded->manifest().session_id() != request.session_id())
@@ -95,7 +98,8 @@ class FakeLender final : public Lender {
 
   std::mutex mutex;
   std::string asked_by;
-  std::atomic<int> watches = 0;  ///< that have begun
+  std::set<std::string> certificates;  ///< that asked
+  std::atomic<int> watches = 0;        ///< that have begun
   std::atomic<bool> films = true;
   bool refuses = false;
   bool loses_answers = false;  ///< to Record and to Part
@@ -194,6 +198,20 @@ TEST_F(RemoteHostTest, WithoutACertificateOfTheHostsNobodyIsLetIn) {
   EXPECT_FALSE(host->connected());
   EXPECT_EQ(host->status().light(), v1::RED);
   EXPECT_EQ(lender.asked_by, "");
+}
+
+TEST_F(RemoteHostTest, ALeaderIsKnownByItsCertificateToo) {
+  rig::HostsConfig other = config;
+  const rig::TlsIdentity issued = authority.issue("localhost");
+  write("other.crt", issued.certificate);
+  write("other.key", issued.key);
+  other.certificate = temp / "other.crt";
+  other.key = temp / "other.key";
+  ASSERT_TRUE(reach()->borrow().ok());
+  ASSERT_TRUE(reach()->borrow().ok());
+  EXPECT_EQ(lender.certificates.size(), 1U);
+  ASSERT_TRUE(reach(other)->borrow().ok());
+  EXPECT_EQ(lender.certificates.size(), 2U) << "of the same name";
 }
 
 TEST_F(RemoteHostTest, ACameraFilmsFromAfar) {

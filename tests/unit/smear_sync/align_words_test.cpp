@@ -118,6 +118,32 @@ TEST(AlignWords, EveryCauseOfAVerdictHasASentenceOfItsOwn) {
   EXPECT_EQ(said.count(""), 0U);
 }
 
+/// Of every cause, with and without cameras whose dot is rough or stood: only a run that ended has a remedy,
+/// and it doesn't ask for the opposite of what the reason does.
+TEST(AlignWords, ARemedyNeverContradictsItsReason) {
+  const auto asks = [](const std::string& text, const char* word) {
+    return text.find(word) != std::string::npos;
+  };
+  for (auto cause = AlignCause::untrimmable; cause <= AlignCause::dial;
+       cause = static_cast<AlignCause>(static_cast<int>(cause) + 1))
+    for (const bool rough : {false, true})
+      for (const auto verdict :
+           {AlignVerdict::go_on, AlignVerdict::aligned, AlignVerdict::refused, AlignVerdict::given_up}) {
+        AlignDecision decision = decision_of(3);
+        decision.verdict = verdict;
+        decision.dial.emplace().set = Hertz(23.976);
+        decision.reason = {
+            .cause = cause, .cameras = {0, 2}, .sigma = milliseconds(0.3), .looks = 7, .rounds = 5};
+        (rough ? decision.reason.rough : decision.reason.unmoved) = {0, 2};
+        const AlignWords said = words(decision, one_unreadable(""), kThree, AlignOptions{});
+        const bool ended = verdict == AlignVerdict::refused || verdict == AlignVerdict::given_up;
+        EXPECT_EQ(said.remedy.empty(), !ended) << said.remedy;
+        EXPECT_FALSE(asks(said.reason, "finer") && asks(said.remedy, "wider")) << said.reason << said.remedy;
+        EXPECT_FALSE(asks(said.reason, "or more") && asks(said.remedy, "finer"))
+            << said.reason << said.remedy;
+      }
+}
+
 TEST(AlignWords, EveryCauseOfADialHasASentenceOfItsOwn) {
   const AlignRound round = one_unreadable("");
   AlignOptions options;

@@ -15,13 +15,22 @@
 #include "base/clock.h"
 #include "base/log.h"
 #include "daemon/server/grpc_services.h"
+#include "daemon/server/repeat_filter.h"
 
 namespace emberlock::daemon {
 namespace {
 
 /// Redirects gRPC's own messages to our log.
 void log_grpc(gpr_log_func_args* args) {
+  static RepeatFilter& filter = *new RepeatFilter;  // gRPC's threads log until the process ends
   spdlog::logger& logger = log(LogCategory::daemon);
+  if (args->severity == GPR_LOG_SEVERITY_ERROR) {
+    const auto held_back = filter.pass(args->file, args->line, SteadyClock().now());
+    if (!held_back) return;
+    const std::string more =
+        *held_back > 0 ? fmt::format(" ({} like it in between)", *held_back) : std::string();
+    return logger.warn("gRPC: {}{}", args->message, more);
+  }
   switch (args->severity) {
     case GPR_LOG_SEVERITY_DEBUG:
       logger.debug("gRPC: {}", args->message);
@@ -30,7 +39,6 @@ void log_grpc(gpr_log_func_args* args) {
       logger.info("gRPC: {}", args->message);
       break;
     case GPR_LOG_SEVERITY_ERROR:
-      logger.warn("gRPC: {}", args->message);
       break;
   }
 }

@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 
 #include "daemon/server/auth_failures.h"
+#include "daemon/server/repeat_filter.h"
 
 namespace emberlock::daemon {
 namespace {
@@ -75,6 +76,22 @@ TEST_F(ServerAuthFailures, HoweverManyGuessTheLogAndTheMemoryAreBounded) {
   EXPECT_GE(lines, 10 * AuthFailures::kMostLines / 2) << "but something is said each minute";
   EXPECT_LE(lines, 11 * AuthFailures::kMostLines);
   EXPECT_EQ(failures.counts().at("http")[static_cast<std::size_t>(Refusal::wrong_token)], 100'000U);
+}
+
+/// Two messages a second for an hour, of two places in gRPC.
+TEST(RepeatFilter, PassesOneOfAKindAMinuteAndCountsTheRest) {
+  RepeatFilter filter;
+  std::uint64_t passed = 0, counted = 0;
+  constexpr int kHalfSeconds = 7200;
+  for (int i = 0; i <= kHalfSeconds; ++i)
+    for (const int line : {1495, 7}) {
+      const auto before = filter.pass("ssl_transport_security.cc", line, {i * std::int64_t{500'000'000}});
+      if (!before) continue;
+      ++passed;
+      counted += *before;
+    }
+  EXPECT_EQ(passed, 2 * 61U);
+  EXPECT_EQ(passed + counted, 2 * (kHalfSeconds + 1U));
 }
 
 }  // namespace

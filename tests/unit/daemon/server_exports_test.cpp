@@ -6,6 +6,7 @@
 #include <gtest/gtest.h>
 
 #include "daemon/server/exported_file.h"
+#include "daemon/server/http_range.h"
 #include "session/store.h"
 #include "tests/support/http_server.h"
 
@@ -72,6 +73,55 @@ TEST_F(ServerExportsTest, AConnectionGoesOnAfterAVideo) {
   const std::size_t second = answers.body.find("\r\n\r\nfilmHTTP/1.1 200");
   EXPECT_NE(second, std::string::npos);
   EXPECT_TRUE(answers.body.ends_with("\r\n\r\nfilm"));
+}
+
+/// Every range of a small file against the bytes themselves, and forms that mean the whole file.
+TEST_F(ServerExportsTest, APartOfAFileIsSentAsItIsAskedFor) {
+  const std::string bytes = "0123456789";
+  using Kind = RangeRequest::Kind;
+  const auto expect = [&](const std::string& header, Kind kind, const std::string& part) {
+    const RangeRequest asked = parse_range(header, bytes.size());
+    EXPECT_EQ(asked.kind, kind) << header;
+    if (kind == Kind::part) EXPECT_EQ(bytes.substr(asked.range.first, asked.range.length), part) << header;
+  };
+  for (std::size_t first = 0; first <= 12; ++first) {
+    const bool begins = first < bytes.size();
+    const std::string from = "bytes=" + std::to_string(first) + "-";
+    expect(from, begins ? Kind::part : Kind::unsatisfiable, begins ? bytes.substr(first) : "");
+    for (std::size_t last = first; last <= 12; ++last)
+      expect(from + std::to_string(last), begins ? Kind::part : Kind::unsatisfiable,
+             begins ? bytes.substr(first, last - first + 1) : "");
+    const std::size_t count = std::min(first, bytes.size());
+    expect("bytes=-" + std::to_string(first), count > 0 ? Kind::part : Kind::unsatisfiable,
+           bytes.substr(bytes.size() - count));
+  }
+  for (const char* whole :
+       {"", "bytes", "bytes=", "bytes=-", "bytes=4-2", "bytes=a-b", "bytes=1-2,4-5", "bytes=1", "lines=1-2",
+        "bytes=-1-2", "bytes=1-99999999999999999999", "bytes= 1-2"})
+    expect(whole, Kind::whole, "");
+  EXPECT_EQ(parse_range("bytes=0-", 0).kind, Kind::unsatisfiable);
+
+  const std::string target = "/exports/take%201/video/cam%201.mp4";
+  const auto ask_part = [&](const std::string& headers, const char* method = "GET") {
+    return ask(port, method, target, "", test::kLetIn + headers);
+  };
+  const HttpAnswer whole = ask_part("");
+  EXPECT_THAT(whole.head, HasSubstr("Accept-Ranges: bytes"));
+  const std::size_t at = whole.head.find("ETag: ") + 6;
+  const std::string tag = whole.head.substr(at, whole.head.find('\r', at) - at);
+  for (const char* condition : {"", "same"}) {
+    const HttpAnswer part =
+        ask_part("Range: bytes=1-2\r\n" + (*condition ? "If-Range: " + tag + "\r\n" : ""));
+    EXPECT_EQ(part.status, 206);
+    EXPECT_EQ(part.body, "il");
+    EXPECT_THAT(part.head, HasSubstr("Content-Range: bytes 1-2/4"));
+    EXPECT_THAT(part.head, HasSubstr("Content-Length: 2"));
+  }
+  EXPECT_EQ(ask_part("Range: bytes=1-2\r\nIf-Range: \"another\"\r\n").body, "film");
+  EXPECT_EQ(ask_part("Range: bytes=1-2\r\n", "HEAD").status, 200);
+  const HttpAnswer behind = ask_part("Range: bytes=4-\r\n");
+  EXPECT_EQ(behind.status, 416);
+  EXPECT_THAT(behind.head, HasSubstr("Content-Range: bytes */4"));
 }
 
 TEST_F(ServerExportsTest, NamesAreInAnyScript) {

@@ -38,7 +38,7 @@ class DeviceWatch {
  private:
   std::vector<std::string> ids_;
   std::vector<v1::CameraStatus::State> states_;
-  std::vector<std::string> refusals_;  ///< by camera, as they were told last
+  std::vector<std::string> refusals_;  ///< by camera, as they were reported last
   bool all_lost_ = false;
   std::optional<std::string> strobe_trouble_;  ///< as it was told last
   std::optional<Seconds> wall_ahead_;

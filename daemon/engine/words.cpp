@@ -161,7 +161,7 @@ std::string remedy_of_lost_lock(const Reason& reason) {
 /// What whoever refused says.
 std::string own_remedy(const Reason& reason) {
   if (const auto* refused = std::get_if<DiskRefused>(&reason)) return refused->error.remedy;
-  if (const auto* says = std::get_if<AlignmentSays>(&reason)) return says->remedy;
+  if (const auto* alignment = std::get_if<AlignmentSays>(&reason)) return alignment->remedy;
   const Error* error = std::get_if<Error>(&reason);
   return error == nullptr ? "" : error->remedy;
 }

@@ -22,7 +22,7 @@ using testing::IsEmpty;
 using testing::Not;
 
 json two_frames() {
-  return json::parse_fields(R"({"fl_x": 500, "w": 64, "h": 48, "frames": [
+  return json::parse(R"({"fl_x": 500, "w": 64, "h": 48, "frames": [
       {"file_path": "a.png", "transform_matrix": [[1,0,0,0],[0,1,0,0],[0,0,1,0.5],[0,0,0,1]]},
       {"file_path": "b.png", "transform_matrix": [[1,0,0,0.1],[0,1,0,0],[0,0,1,0.5],[0,0,0,1]]}]})");
 }

@@ -15,7 +15,9 @@ namespace emberlock::session {
 namespace {
 
 std::uint32_t byte_of(std::string_view s, std::size_t i) { return static_cast<unsigned char>(s[i]); }
-std::uint32_t big_endian16(std::string_view s, std::size_t i) { return byte_of(s, i) << 8 | byte_of(s, i + 1); }
+std::uint32_t big_endian16(std::string_view s, std::size_t i) {
+  return byte_of(s, i) << 8 | byte_of(s, i + 1);
+}
 std::uint32_t big_endian32(std::string_view s, std::size_t i) {
   return big_endian16(s, i) << 16 | big_endian16(s, i + 2);
 }
@@ -216,8 +218,8 @@ Result<StillContents> examine_tiff(std::string_view s, const std::string& where)
   const std::int64_t stated = imagej_pictures(tiff.text(page, kDescription));
   if (stated > 1 && found.pictures.size() == 1) {
     return Error{ErrorKind::bad_input,
-                 fmt::format("the TIFF is a stack of {} pictures by ImageJ, with one directory", stated), where,
-                 "Save it as an image sequence"};
+                 fmt::format("the TIFF is a stack of {} pictures by ImageJ, with one directory", stated),
+                 where, "Save it as an image sequence"};
   }
   return found;
 }

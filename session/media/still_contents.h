@@ -14,13 +14,13 @@ namespace emberlock::session {
 /// The structure of a PNM, PNG, JPEG or TIFF file, found without decoding it.
 struct StillContents {
   struct Picture {
-    std::size_t begin = 0;  ///< first byte; of a TIFF, the offset of the picture's directory
-    std::size_t end = 0;    ///< behind the last byte; of a TIFF, the end of the file
+    std::size_t begin = 0;   ///< first byte; of a TIFF, the offset of the picture's directory
+    std::size_t end = 0;     ///< behind the last byte; of a TIFF, the end of the file
     std::int64_t width = 0;  ///< as the header states it; 0 where decoding checks it (PNM)
     std::int64_t height = 0;
   };
   std::vector<Picture> pictures{};  ///< JPEGs or binary PNMs one behind the other, the pages of a TIFF
-  int orientation = 1;  ///< EXIF orientation 1..8 of the first picture; 1: as stored
+  int orientation = 1;              ///< EXIF orientation 1..8 of the first picture; 1: as stored
 };
 
 /// Errors (bad_input): the first picture is truncated or damaged, or the file holds further pictures that

@@ -29,15 +29,15 @@ TEST(ImportFilms, JoinsOnlyWhatItsNamesDoNotContradict) {
     std::vector<std::string> files;
     std::string refusal;  // empty: one film
   };
-  for (const Row& row : std::vector<Row>{
-           {{"MVI_0001", "MVI_0002"}, ""},
-           {{"GH010123", "GH020123", "GH030123"}, ""},
-           {{"GOPR0042", "GP010042"}, ""},
-           {{"GH010123", "GH010124"}, "is of recording 0124, GH010123.mov is of recording 0123"},
-           {{"GOPR0001", "GOPR0002"}, "recording 0002"},
-           {{"GP010001", "GOPR0002"}, "recording 0002"},
-           {{"GX010123", "GX030123"}, "a chapter between them is missing"},
-           {{"GOPR0042", "GP020042"}, "a chapter between them is missing"}}) {
+  for (const Row& row :
+       std::vector<Row>{{{"MVI_0001", "MVI_0002"}, ""},
+                        {{"GH010123", "GH020123", "GH030123"}, ""},
+                        {{"GOPR0042", "GP010042"}, ""},
+                        {{"GH010123", "GH010124"}, "is of recording 0124, GH010123.mov is of recording 0123"},
+                        {{"GOPR0001", "GOPR0002"}, "recording 0002"},
+                        {{"GP010001", "GOPR0002"}, "recording 0002"},
+                        {{"GX010123", "GX030123"}, "a chapter between them is missing"},
+                        {{"GOPR0042", "GP020042"}, "a chapter between them is missing"}}) {
     const test::TempFolder temp;
     session::CameraFiles files{"cam", "cam", session::CameraFiles::Kind::video, {}, {}};
     for (const std::string& name : row.files) {

@@ -130,13 +130,13 @@ TEST(StillContents, AFileOfSeveralPicturesGivesThemAll) {
       jpegs += encoded(image, ".jpg");
       padded += encoded(image, ".jpg") + std::string(5, '\0');
     }
-    for (const auto& [name, content] : std::vector<std::pair<std::string, std::string>>{
-             {"a.pgm", pnms},
-             {"little.tif", tiff_of(images, {})},
-             {"big.tif", tiff_of(images, {.big = true})},
-             {"turned.tif", tiff_of(images, {.orientation = 3})},
-             {"a.mjpeg", jpegs},
-             {"padded.mjpeg", padded}}) {
+    for (const auto& [name, content] :
+         std::vector<std::pair<std::string, std::string>>{{"a.pgm", pnms},
+                                                          {"little.tif", tiff_of(images, {})},
+                                                          {"big.tif", tiff_of(images, {.big = true})},
+                                                          {"turned.tif", tiff_of(images, {.orientation = 3})},
+                                                          {"a.mjpeg", jpegs},
+                                                          {"padded.mjpeg", padded}}) {
       SCOPED_TRACE(name + " of " + std::to_string(count));
       const TempFolder temp;
       put_bytes(temp / name, content);
@@ -174,7 +174,8 @@ TEST(StillContents, PreviewsAndMasksAreNoFurtherPictures) {
   index.put(6, 2).text += std::string("MPF\0", 4);
   const std::string with_gain_map = index.text + jpeg.substr(2) + jpeg;
   EXPECT_THAT(examine_still(with_gain_map, "a.jpg")->pictures, SizeIs(1));
-  EXPECT_THAT(examine_still(jpeg + "a film follows", "a.jpg")->pictures, SizeIs(1)) << "moving pictures of phones";
+  EXPECT_THAT(examine_still(jpeg + "a film follows", "a.jpg")->pictures, SizeIs(1))
+      << "moving pictures of phones";
 }
 
 TEST(StillContents, RefusesPicturesThatItCannotRead) {

@@ -25,7 +25,8 @@ void expect_av(int code) {
   if (code < 0) throw std::runtime_error(av_message(code));
 }
 
-/// A film of one orange frame in limited range, by the matrix with these shares of red and blue in brightness.
+/// A film of one orange frame in limited range, by the matrix with these shares of red and blue in
+/// brightness.
 void write_orange(const std::filesystem::path& path, ImageSize size, AVPixelFormat format, AVColorSpace tag,
                   double red, double blue) {
   quiet_libav();
@@ -89,17 +90,13 @@ TEST(VideoColours, AreDecodedByTheTagsMatrixOrByTheSize) {
     ImageSize size;
     double red, blue;
   };
-  for (const auto& [tag, size, red, blue] : {Row{AVCOL_SPC_BT709, kSmall, 0.2126, 0.0722},
-                                             Row{AVCOL_SPC_SMPTE170M, kSmall, 0.299, 0.114},
-                                             Row{AVCOL_SPC_BT470BG, kHd, 0.299, 0.114},
-                                             Row{AVCOL_SPC_BT2020_NCL, kSmall, 0.2627, 0.0593},
-                                             Row{AVCOL_SPC_BT2020_NCL, kHd, 0.2627, 0.0593},
-                                             Row{AVCOL_SPC_SMPTE240M, kSmall, 0.212, 0.087},
-                                             Row{AVCOL_SPC_FCC, kSmall, 0.30, 0.11},
-                                             Row{AVCOL_SPC_UNSPECIFIED, kSmall, 0.299, 0.114},
-                                             Row{AVCOL_SPC_UNSPECIFIED, {720, 576}, 0.299, 0.114},
-                                             Row{AVCOL_SPC_UNSPECIFIED, kHd, 0.2126, 0.0722},
-                                             Row{AVCOL_SPC_UNSPECIFIED, {720, 1280}, 0.2126, 0.0722}}) {
+  for (const auto& [tag, size, red, blue] :
+       {Row{AVCOL_SPC_BT709, kSmall, 0.2126, 0.0722}, Row{AVCOL_SPC_SMPTE170M, kSmall, 0.299, 0.114},
+        Row{AVCOL_SPC_BT470BG, kHd, 0.299, 0.114}, Row{AVCOL_SPC_BT2020_NCL, kSmall, 0.2627, 0.0593},
+        Row{AVCOL_SPC_BT2020_NCL, kHd, 0.2627, 0.0593}, Row{AVCOL_SPC_SMPTE240M, kSmall, 0.212, 0.087},
+        Row{AVCOL_SPC_FCC, kSmall, 0.30, 0.11}, Row{AVCOL_SPC_UNSPECIFIED, kSmall, 0.299, 0.114},
+        Row{AVCOL_SPC_UNSPECIFIED, {720, 576}, 0.299, 0.114}, Row{AVCOL_SPC_UNSPECIFIED, kHd, 0.2126, 0.0722},
+        Row{AVCOL_SPC_UNSPECIFIED, {720, 1280}, 0.2126, 0.0722}}) {
     for (const AVPixelFormat format : {AV_PIX_FMT_YUV444P, AV_PIX_FMT_YUV444P10LE}) {
       SCOPED_TRACE(std::string(av_color_space_name(tag)) + " of " + std::to_string(size.height) + " rows");
       const test::TempFolder temp;

@@ -31,7 +31,8 @@ Image moving_bar(int frame) {
   Image image(ImageLayout{kSize, PixelFormat::gray8, 8});
   for (int y = 0; y < kSize.height; ++y) {
     for (int x = 0; x < kSize.width; ++x)
-      image.row_as<std::uint8_t>(y)[x] = static_cast<std::uint8_t>(x >= frame && x < frame + 8 ? 200 : 30 + y);
+      image.row_as<std::uint8_t>(y)[x] =
+          static_cast<std::uint8_t>(x >= frame && x < frame + 8 ? 200 : 30 + y);
   }
   return image;
 }
@@ -149,7 +150,8 @@ TEST(VideoScan, ReportsADisplayMatrixAndPixelsThatAreNotSquare) {
   for (const Row& row : rows) {
     const test::TempFolder temp;
     const auto& t = row.turn;
-    const VideoDisplay display{{{t[0], t[1], 0, t[2], t[3], 0, 0, 0, kLast}}, row.pixel_width, row.pixel_height};
+    const VideoDisplay display{
+        {{t[0], t[1], 0, t[2], t[3], 0, 0, 0, kLast}}, row.pixel_width, row.pixel_height};
     auto writer = VideoWriter::create(temp / "film.mp4", {kSize, PixelFormat::gray8, 8}, Hertz(25), 0,
                                       VideoWriter::Coding::for_players, display);
     ASSERT_TRUE(writer.ok());
@@ -158,7 +160,8 @@ TEST(VideoScan, ReportsADisplayMatrixAndPixelsThatAreNotSquare) {
     const Result<VideoScan> scan = scan_video(temp / "film.mp4");
     ASSERT_TRUE(scan.ok()) << scan.error().message();
     ASSERT_EQ(scan->unapplied.size(), row.fields.size());
-    for (std::size_t i = 0; i < row.fields.size(); ++i) EXPECT_THAT(scan->unapplied[i], HasSubstr(row.fields[i]));
+    for (std::size_t i = 0; i < row.fields.size(); ++i)
+      EXPECT_THAT(scan->unapplied[i], HasSubstr(row.fields[i]));
     EXPECT_EQ(scan->size.width, kSize.width) << "frames stay as they are stored";
   }
 }

@@ -76,7 +76,7 @@ Result<std::vector<ResultVolume>> chosen_volumes(const ExportArguments& a,
 }
 
 /// Of the frames that are asked for.
-void warn_of_missing(const ExportArguments& a, const std::vector<ResultVolume>& all) {
+void warn_of_frames_missing(const ExportArguments& a, const std::vector<ResultVolume>& all) {
   std::vector<std::uint64_t> missing = missing_frames(a.result, all);
   if (a.frames)
     std::erase_if(missing, [&](std::uint64_t f) { return f < a.frames->first || f > a.frames->second; });
@@ -175,7 +175,7 @@ Status export_result(const ExportArguments& a, const std::string& program) try {
   EMBERLOCK_ASSIGN_OR_RETURN(const std::vector<ResultVolume> volumes, chosen_volumes(a, all));
   const OutputRequest request{a.out, kExport, {a.result}};
   EMBERLOCK_RETURN_IF_ERROR(OutputFolder::check(request));
-  warn_of_missing(a, all);
+  warn_of_frames_missing(a, all);
   const FileFormat& format = file_formats().at(a.format);
   if (!a.key.empty() && std::string_view(format.ending) != ".vdb")
     return Error{ErrorKind::bad_input, "files of this format carry no certificate to sign", "--key",

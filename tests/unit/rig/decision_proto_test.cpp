@@ -57,7 +57,7 @@ TEST(DecisionProto, NoSentenceHasAPlaceInIt) {
 TEST(DecisionProto, AnotherWordingIsRecordedAlike) {
   Recorded once;
   Recorded reworded;
-  reworded.words = {"a verdict", {"to the one", "to the other"}, "turn it"};
+  reworded.words = {"a verdict", "a remedy", {"to the one", "to the other"}, "turn it"};
   reworded.round.cameras[1].phase.reason = "no lamp in view";
   EXPECT_EQ(once.bytes(), reworded.bytes());
   EXPECT_EQ(to_proto({once.round,

@@ -121,6 +121,8 @@ TEST(AlignWords, EveryCauseOfAVerdictHasASentenceOfItsOwn) {
 /// Of every cause, with and without cameras whose dot is rough or stood: only a run that ended has a remedy,
 /// and it doesn't ask for the opposite of what the reason does.
 TEST(AlignWords, ARemedyNeverContradictsItsReason) {
+  AlignOptions options;
+  options.dial = StrobeDial{};
   const auto asks = [](const std::string& text, const char* word) {
     return text.find(word) != std::string::npos;
   };
@@ -135,7 +137,7 @@ TEST(AlignWords, ARemedyNeverContradictsItsReason) {
         decision.reason = {
             .cause = cause, .cameras = {0, 2}, .sigma = milliseconds(0.3), .looks = 7, .rounds = 5};
         (rough ? decision.reason.rough : decision.reason.unmoved) = {0, 2};
-        const AlignWords said = words(decision, one_unreadable(""), kThree, AlignOptions{});
+        const AlignWords said = words(decision, one_unreadable(""), kThree, options);
         const bool ended = verdict == AlignVerdict::refused || verdict == AlignVerdict::given_up;
         EXPECT_EQ(said.remedy.empty(), !ended) << said.remedy;
         EXPECT_FALSE(asks(said.reason, "finer") && asks(said.remedy, "wider")) << said.reason << said.remedy;

@@ -43,9 +43,7 @@ bool is_pinhole(const json& value) {
   return is_one_of(value, {"OPENCV", "FULL_OPENCV", "PINHOLE", "SIMPLE_PINHOLE", "RADIAL", "SIMPLE_RADIAL",
                            "perspective", "plumb_bob", "radtan", "none"});
 }
-bool is_metres(const json& value) {
-  return is_one_of(value, {"m", "metre", "metres", "meter", "meters"});
-}
+bool is_metres(const json& value) { return is_one_of(value, {"m", "metre", "metres", "meter", "meters"}); }
 bool never(const json& /*value*/) { return false; }
 
 /// A key that is refused, unless its value changes nothing.
@@ -96,35 +94,36 @@ constexpr std::array kRefusals = {
     KeyRefusal{"units", is_metres, "is another unit than metres", kMetres},
 };
 
-constexpr auto kUsedByBoth = std::to_array<std::string_view>({"fl_x", "fl_y", "camera_angle_x", "camera_angle_y", "x_fov", "y_fov",  "cx", "cy", "w", "h", "width",
-    "height", "k1", "k2", "k3", "p1", "p2"});
-constexpr auto kUsedByFile = std::to_array<std::string_view>({"frames", "box", "camera_response", "n_frames",
-                                                         "white_transparent"});
-constexpr auto kUsedByFrame = std::to_array<std::string_view>({"file_path", "transform_matrix", "mask_path",
-                                                          "time"});
+constexpr auto kUsedByBoth =
+    std::to_array<std::string_view>({"fl_x", "fl_y", "camera_angle_x", "camera_angle_y", "x_fov", "y_fov",
+                                     "cx", "cy", "w", "h", "width", "height", "k1", "k2", "k3", "p1", "p2"});
+constexpr auto kUsedByFile =
+    std::to_array<std::string_view>({"frames", "box", "camera_response", "n_frames", "white_transparent"});
+constexpr auto kUsedByFrame =
+    std::to_array<std::string_view>({"file_path", "transform_matrix", "mask_path", "time"});
 // Blender's NeRF export, instant-ngp, nerfstudio and Polycam write them.
 constexpr auto kIgnored = std::to_array<std::string_view>({"aabb",
-    "aabb_scale",
-    "applied_transform",
-    "auto_scale_poses_override",
-    "black_transparent",
-    "colmap_im_id",
-    "comment",
-    "depth_file_path",
-    "depth_path",
-    "enable_depth_loading",
-    "fps",
-    "importance_sampling",
-    "integer_depth_scale",
-    "n_extra_learnable_dims",
-    "offset",
-    "orientation_override",
-    "ply_file_path",
-    "render_aabb",
-    "rotation",
-    "scale",
-    "sharpness",
-    "up"});
+                                                           "aabb_scale",
+                                                           "applied_transform",
+                                                           "auto_scale_poses_override",
+                                                           "black_transparent",
+                                                           "colmap_im_id",
+                                                           "comment",
+                                                           "depth_file_path",
+                                                           "depth_path",
+                                                           "enable_depth_loading",
+                                                           "fps",
+                                                           "importance_sampling",
+                                                           "integer_depth_scale",
+                                                           "n_extra_learnable_dims",
+                                                           "offset",
+                                                           "orientation_override",
+                                                           "ply_file_path",
+                                                           "render_aabb",
+                                                           "rotation",
+                                                           "scale",
+                                                           "sharpness",
+                                                           "up"});
 
 const TransformsField* find_field(std::string_view key) {
   const auto& fields = transforms_fields();
@@ -134,11 +133,8 @@ const TransformsField* find_field(std::string_view key) {
 
 /// The used key that was probably meant, by its letters or by another program's name for it.
 std::optional<std::string> meant_key(const std::string& key, FieldLevel level) {
-  constexpr std::array<std::pair<const char*, const char*>, 5> kOtherNames = {{{"fx", "fl_x"},
-                                                                               {"fy", "fl_y"},
-                                                                               {"focallength", "fl_x"},
-                                                                               {"focalx", "fl_x"},
-                                                                               {"focaly", "fl_y"}}};
+  constexpr std::array<std::pair<const char*, const char*>, 5> kOtherNames = {
+      {{"fx", "fl_x"}, {"fy", "fl_y"}, {"focallength", "fl_x"}, {"focalx", "fl_x"}, {"focaly", "fl_y"}}};
   const std::string letters = letters_of(key);
   for (const auto& [other, ours] : kOtherNames)
     if (letters == other) return ours;
@@ -199,11 +195,11 @@ class KeyCheck {
                  level == FieldLevel::file ? "is a key of a frame" : "is a key of the file, not of a frame",
                  "Move it there");
     if (field->use != FieldUse::refused) return;
-    const auto refusal = std::find_if(kRefusals.begin(), kRefusals.end(),
-                                      [&](const KeyRefusal& r) { return r.key == key; });
+    const auto refusal =
+        std::find_if(kRefusals.begin(), kRefusals.end(), [&](const KeyRefusal& r) { return r.key == key; });
     if (refusal->changes_nothing(value)) return;
-    const bool fisheye = value.is_string() && letters_of(value.get_ref<const std::string&>()).find("fisheye") !=
-                                                  std::string::npos;
+    const bool fisheye = value.is_string() &&
+                         letters_of(value.get_ref<const std::string&>()).find("fisheye") != std::string::npos;
     const std::string shown = value.dump(-1, ' ', true, json::error_handler_t::replace);
     const std::string model = shown + (fisheye ? " is a fisheye lens, which is not modelled"
                                                : " is no pinhole camera that is modelled");

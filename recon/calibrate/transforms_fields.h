@@ -29,9 +29,9 @@ struct TransformsField {
 /// The known keys of NeRF, instant-ngp, nerfstudio and Polycam, and our own.
 const std::vector<TransformsField>& transforms_fields();
 
-/// Checks the keys of a transforms.json, and returns the unknown ones, sorted, each once. Errors: all keys that
-/// are refused, that belong elsewhere in the file or look like a misspelling of a used key, in one error.
-/// `file` names the file.
+/// Checks the keys of a transforms.json, and returns the unknown ones, sorted, each once. Errors: all keys
+/// that are refused, that belong elsewhere in the file or look like a misspelling of a used key, in one
+/// error. `file` names the file.
 Result<std::vector<std::string>> check_transforms_keys(const nlohmann::json& document,
                                                        const std::string& file);
 

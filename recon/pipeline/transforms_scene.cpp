@@ -39,8 +39,7 @@ Result<FrameList> frames_of_instant(const Transforms& transforms, std::optional<
         return bad_transforms(frame.where + ".time", "is missing, although other frames have different times",
                               "Give every frame its time, or none");
   if (times.size() <= 1) {
-    if (number)
-      return bad_transforms(transforms.where, "has one instant only", "Leave --frame out");
+    if (number) return bad_transforms(transforms.where, "has one instant only", "Leave --frame out");
     return transforms.frames;
   }
   if (!number || *number >= times.size())
@@ -127,11 +126,11 @@ Status check_files(const std::vector<ChosenFrame>& chosen) {
   constexpr std::size_t kNamed = 8;
   const std::size_t more = missing.size() > kNamed ? missing.size() - kNamed : 0;
   missing.resize(missing.size() - more);
-  return bad_transforms(where,
-                        fmt::format("{} {} missing: {}{}", missing.size() + more,
-                                    missing.size() == 1 ? "file is" : "files are", fmt::join(missing, ", "),
-                                    more > 0 ? fmt::format(" and {} more", more) : ""),
-                        "Correct the paths, which start from the json's folder, or bring the files there");
+  return bad_transforms(
+      where,
+      fmt::format("{} {} missing: {}{}", missing.size() + more, missing.size() == 1 ? "file is" : "files are",
+                  fmt::join(missing, ", "), more > 0 ? fmt::format(" and {} more", more) : ""),
+      "Correct the paths, which start from the json's folder, or bring the files there");
 }
 
 Result<Image> read_picture(const fs::path& file, const TransformsFrame& frame, const char* key) {
@@ -228,7 +227,8 @@ Result<Scene> load_transforms(const fs::path& path, const SceneOptions& options)
   }
   if (masked > 0)
     scene.preprocessing.push_back(
-        {"masks", true, fmt::format("{} of {} pictures have pixels that are left out", masked, chosen.size())});
+        {"masks", true,
+         fmt::format("{} of {} pictures have pixels that are left out", masked, chosen.size())});
   if (std::string warning = passed_over_warning(transforms); !warning.empty())
     scene.warnings.push_back(std::move(warning));
   if (options.box || transforms.box) {

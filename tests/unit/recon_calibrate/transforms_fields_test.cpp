@@ -110,30 +110,41 @@ TEST(TransformsFields, AValueThatChangesNothingIsAccepted) {
       {"unit", "Metres"}, {"rolling_shutter", json::array({0, 0, 0})},
       {"s1", 0},          {"latlong", false}};
   for (const auto& [key, value] : rows) EXPECT_TRUE(parse(with_field({key}, value)).ok()) << key << value;
-  for (const char* model : {"OPENCV_FISHEYE", "RADIAL_FISHEYE", "SIMPLE_RADIAL_FISHEYE", "THIN_PRISM_FISHEYE"})
+  for (const char* model :
+       {"OPENCV_FISHEYE", "RADIAL_FISHEYE", "SIMPLE_RADIAL_FISHEYE", "THIN_PRISM_FISHEYE"})
     EXPECT_THAT(parse(with_field({"camera_model"}, model)), FailsWith("camera_model", "fisheye")) << model;
   for (const char* model : {"FOV", "EQUIRECTANGULAR", "ORTHOPHOTO", ""})
     EXPECT_THAT(parse(with_field({"camera_model"}, model)), FailsWith("camera_model", "no pinhole")) << model;
 }
 
 TEST(TransformsFields, AMisspelledKeyIsRefusedWithTheOneThatWasMeant) {
-  const std::vector<std::pair<const char*, const char*>> in_frames = {
-      {"filepath", "file_path"},       {"filePath", "file_path"},
-      {"file-path", "file_path"},      {"flie_path", "file_path"},
-      {"file_pth", "file_path"},       {"transform_matrx", "transform_matrix"},
-      {"transformMatrix", "transform_matrix"}, {"tranform_matrix", "transform_matrix"},
-      {"mask_paht", "mask_path"},      {"maskpath", "mask_path"},
-      {"FL_X", "fl_x"},                {"flx", "fl_x"},
-      {"fx", "fl_x"},                  {"fy", "fl_y"},
-      {"K1", "k1"},                    {"P2", "p2"},
-      {"Cx", "cx"},                    {"W", "w"},
-      {"camera_angle_X", "camera_angle_x"}, {"camera-model", "camera_model"},
-      {"is_fish_eye", "is_fisheye"},   {"Time", "time"}};
+  const std::vector<std::pair<const char*, const char*>> in_frames = {{"filepath", "file_path"},
+                                                                      {"filePath", "file_path"},
+                                                                      {"file-path", "file_path"},
+                                                                      {"flie_path", "file_path"},
+                                                                      {"file_pth", "file_path"},
+                                                                      {"transform_matrx", "transform_matrix"},
+                                                                      {"transformMatrix", "transform_matrix"},
+                                                                      {"tranform_matrix", "transform_matrix"},
+                                                                      {"mask_paht", "mask_path"},
+                                                                      {"maskpath", "mask_path"},
+                                                                      {"FL_X", "fl_x"},
+                                                                      {"flx", "fl_x"},
+                                                                      {"fx", "fl_x"},
+                                                                      {"fy", "fl_y"},
+                                                                      {"K1", "k1"},
+                                                                      {"P2", "p2"},
+                                                                      {"Cx", "cx"},
+                                                                      {"W", "w"},
+                                                                      {"camera_angle_X", "camera_angle_x"},
+                                                                      {"camera-model", "camera_model"},
+                                                                      {"is_fish_eye", "is_fisheye"},
+                                                                      {"Time", "time"}};
   for (const auto& [key, meant] : in_frames) {
     json document = two_frames();
     document["frames"][1][key] = 1;
-    EXPECT_THAT(parse(document), FailsWith(std::string("frames[1].") + key,
-                                           std::string("did you mean ") + meant + "?"));
+    EXPECT_THAT(parse(document),
+                FailsWith(std::string("frames[1].") + key, std::string("did you mean ") + meant + "?"));
   }
   for (const auto& [key, meant] : std::vector<std::pair<const char*, const char*>>{
            {"Frames", "frames"}, {"N-Frames", "n_frames"}, {"camera_respnse", "camera_response"}})
@@ -145,12 +156,12 @@ TEST(TransformsFields, UnknownKeysArePassedOverAndNamedInOneWarning) {
   for (const char* key : {"train_filenames", "val_filenames", "test_filenames", "from_na", "applied_scale"})
     document[key] = json::array({"a.png"});
   for (json& frame : document["frames"])
-    for (const char* key : {"blur_score", "timestamp", "camera_id", "frame", "iso", "weight", "num_frames"}) frame[key] = 120.3;
+    for (const char* key : {"blur_score", "timestamp", "camera_id", "frame", "iso", "weight", "num_frames"})
+      frame[key] = 120.3;
   const auto read = value_of(parse(document));
   EXPECT_THAT(read.passed_over,
               ElementsAre("applied_scale", "blur_score", "camera_id", "frame", "from_na", "iso", "num_frames",
-                          "test_filenames", "timestamp", "train_filenames", "val_filenames",
-                          "weight"));
+                          "test_filenames", "timestamp", "train_filenames", "val_filenames", "weight"));
   EXPECT_THAT(passed_over_warning(read), HasSubstr("blur_score, camera_id"));
   EXPECT_THAT(passed_over_warning(value_of(parse(two_frames()))), IsEmpty());
 }

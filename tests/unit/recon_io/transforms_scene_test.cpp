@@ -87,10 +87,10 @@ class TransformsScene : public testing::Test {
 /// What hides the ball, or lies next to it, in every view.
 std::vector<std::function<bool(int, int)>> masks() {
   return {
-      [](int x, int) { return x < 12; },                             // an overlay at the border
-      [](int x, int) { return x >= 38 && x < 42; },                  // a bar in front of the flame
+      [](int x, int) { return x < 12; },             // an overlay at the border
+      [](int x, int) { return x >= 38 && x < 42; },  // a bar in front of the flame
       [](int x, int y) { return (x - 40) * (x - 40) + (y - 30) * (y - 30) > 700; },  // all but the flame
-      [](int x, int y) { return (x + y) % 5 == 0; },                 // scattered pixels
+      [](int x, int y) { return (x + y) % 5 == 0; },                                 // scattered pixels
   };
 }
 
@@ -229,7 +229,8 @@ TEST_F(TransformsScene, UnknownKeysAreOneWarning) {
 TEST_F(TransformsScene, WhitePixelsAreRefusedWhereWhiteIsTransparent) {
   document_["white_transparent"] = true;
   EXPECT_TRUE(load().ok()) << "no pixel is white";
-  write_picture(3, [](int x, int y) { return x == 5 && y < 2; }, 255);
+  write_picture(
+      3, [](int x, int y) { return x == 5 && y < 2; }, 255);
   EXPECT_THAT(load(), FailsWith("frames[3]", "white_transparent", "2 pixels"));
   document_["white_transparent"] = false;
   EXPECT_TRUE(load().ok());

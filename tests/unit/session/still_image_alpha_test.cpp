@@ -14,8 +14,7 @@ constexpr int kWidth = 7;
 constexpr int kHeight = 5;
 
 void put(std::string& to, std::uint64_t value, int bytes, bool big = true) {
-  for (int i = 0; i < bytes; ++i)
-    to += static_cast<char>(value >> 8 * (big ? bytes - 1 - i : i) & 255);
+  for (int i = 0; i < bytes; ++i) to += static_cast<char>(value >> 8 * (big ? bytes - 1 - i : i) & 255);
 }
 
 std::uint32_t crc(const std::string& bytes) {  // ISO 3309, as PNG's annex D
@@ -36,7 +35,8 @@ std::string chunk(const std::string& type, const std::string& data) {
 }
 
 /// A PNG whose rows are stored without compression.
-std::string png(int depth, int colour_type, const std::vector<std::string>& rows, const std::string& more = "") {
+std::string png(int depth, int colour_type, const std::vector<std::string>& rows,
+                const std::string& more = "") {
   std::string raw;
   for (const std::string& row : rows) raw += '\0' + row;
   std::uint32_t a = 1;
@@ -122,7 +122,9 @@ std::string joined(const std::vector<std::string>& rows) {
 /// What straight alpha shows over black.
 int over_black(int x, int y, int c, int depth, bool multiply = true) {
   const std::uint64_t white = depth == 8 ? 255 : 65535;
-  const auto value = [&](int sample) { return std::uint64_t{sample_of(x, y, sample, static_cast<std::uint32_t>(white))}; };
+  const auto value = [&](int sample) {
+    return std::uint64_t{sample_of(x, y, sample, static_cast<std::uint32_t>(white))};
+  };
   return static_cast<int>(multiply ? (value(c) * value(3) + white / 2) / white : value(c));
 }
 
@@ -188,7 +190,8 @@ TEST(StillImageAlpha, ASampleWithoutStatedMeaningIsRefusedUnlessItIsOpaque) {
       expect_pixels(
           decode_still_image(tiff(depth, 4, extra, true, strip), "a"), format_of(depth, 3),
           [&](int x, int y, int c) { return over_black(x, y, c, depth, false); }, "an opaque TIFF");
-      EXPECT_FALSE(decode_still_image(tiff(depth, 2, extra, true, joined(rows_of(depth, 1, true))), "a").ok());
+      EXPECT_FALSE(
+          decode_still_image(tiff(depth, 2, extra, true, joined(rows_of(depth, 1, true))), "a").ok());
     }
 }
 
@@ -199,8 +202,8 @@ TEST(StillImageAlpha, ATransparentColourIsBlack) {
       std::string key;
       for (int c = 0; c < colours; ++c) put(key, sample_of(3, 2, c, white), 2);
       expect_pixels(
-          decode_still_image(png(depth, colours == 1 ? 0 : 2, rows_of(depth, colours, false), chunk("tRNS", key)),
-                             "a"),
+          decode_still_image(
+              png(depth, colours == 1 ? 0 : 2, rows_of(depth, colours, false), chunk("tRNS", key)), "a"),
           format_of(depth, colours),
           [&](int x, int y, int c) {
             bool is_key = true;
@@ -223,9 +226,9 @@ TEST(StillImageAlpha, APalettesAlphaIsItsEntries) {
   std::string row;
   for (int x = 0; x < kWidth; ++x) row += static_cast<char>(x);
   expect_pixels(
-      decode_still_image(png(8, 3, std::vector<std::string>(kHeight, row),
-                             chunk("PLTE", palette) + chunk("tRNS", alpha)),
-                         "a"),
+      decode_still_image(
+          png(8, 3, std::vector<std::string>(kHeight, row), chunk("PLTE", palette) + chunk("tRNS", alpha)),
+          "a"),
       PixelFormat::rgb8, [](int x, int, int c) { return over_black(x, 0, c, 8); }, "a palette");
 }
 

@@ -30,7 +30,7 @@ std::optional<std::string> nearest(std::string_view given, const std::vector<std
   if (given.size() > 64) return best;
   for (const std::string& name : known) {
     const std::size_t distance = edits(given, name);
-    if (distance >= fewest) continue;
+    if (distance >= fewest || name.empty()) continue;
     fewest = distance;
     best = name;
   }

@@ -36,7 +36,9 @@ std::vector<const VerbWords*> list_verbs(const VerbWords& program) {
 }
 
 std::vector<const CLI::App*> verbs_of(const CLI::App& app) {
-  return app.get_subcommands([](const CLI::App* verb) { return !verb->get_group().empty(); });
+  // A group of options is a verb without a name to CLI11.
+  return app.get_subcommands(
+      [](const CLI::App* verb) { return !verb->get_group().empty() && !verb->get_name().empty(); });
 }
 
 std::vector<const CLI::Option*> options_of(const CLI::App& app) {

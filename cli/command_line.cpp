@@ -2,15 +2,55 @@
 #include "cli/command_line.h"
 
 #include <algorithm>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
 #include <optional>
+#include <type_traits>
 #include <utility>
 
 #include <CLI/CLI.hpp>
+#include <fmt/format.h>
 
 namespace emberlock::cli {
+namespace {
+
+/// What is wrong with a number that isn't finite: parsers take "nan" and "inf", and no comparison refuses
+/// nan. Other texts are the option's type's to refuse.
+std::string describe_infinite(const std::string& text) {
+  double value = 0;
+  const bool is_number = CLI::detail::lexical_cast(text, value);
+  return !is_number || std::isfinite(value) ? std::string() : text + " is not a finite number";
+}
+
+template <class T>
+constexpr bool kHoldsDoubles = std::is_same_v<T, double> || std::is_same_v<T, std::optional<double>> ||
+                               std::is_same_v<T, std::vector<double>>;
+
+/// CLI11's check with another sentence: its own prints limits with as many as 309 digits.
+template <class Number, class IsGood>
+CLI::Validator check_number(CLI::Validator check, const IsGood& is_good, const std::string& kind) {
+  return check.operation([is_good, kind](const std::string& text) {
+    Number value = 0;
+    const bool good = CLI::detail::lexical_cast(text, value) && is_good(value);
+    return good ? std::string() : text + " is not " + kind;
+  });
+}
+
+template <class Number>
+CLI::Validator make_range(Number low, Number high) {
+  std::string kind;
+  if constexpr (std::is_floating_point_v<Number>) {
+    kind = fmt::format("a number from {:g} to {:g}", low, high);
+  } else {
+    kind = fmt::format("a whole number from {} to {}", low, high);
+  }
+  return check_number<Number>(
+      CLI::Range(low, high), [=](Number value) { return value >= low && value <= high; }, kind);
+}
+
+}  // namespace
 
 Option Option::require() const { return Option(option_->required()); }
 Option Option::show_default() const { return Option(option_->capture_default_str()); }
@@ -32,18 +72,24 @@ Option Option::exclude(const char* name) const { return Option(option_->excludes
 Option Option::need(Option other) const { return Option(option_->needs(other.option_)); }
 Option Option::need(const char* name) const { return Option(option_->needs(name)); }
 
-Option Option::check_range(int low, int high) const { return Option(option_->check(CLI::Range(low, high))); }
+Option Option::check_range(int low, int high) const { return Option(option_->check(make_range(low, high))); }
 Option Option::check_range(unsigned low, unsigned high) const {
-  return Option(option_->check(CLI::Range(low, high)));
+  return Option(option_->check(make_range(low, high)));
 }
 Option Option::check_range(double low, double high) const {
-  return Option(option_->check(CLI::Range(low, high)));
+  return Option(option_->check(make_range(low, high)));
 }
 Option Option::check_unshown_range(double low, double high) const {
-  return Option(option_->check(CLI::Range(low, high).description("")));
+  return Option(option_->check(make_range(low, high).description("")));
 }
-Option Option::check_positive() const { return Option(option_->check(CLI::PositiveNumber)); }
-Option Option::check_not_negative() const { return Option(option_->check(CLI::NonNegativeNumber)); }
+Option Option::check_positive() const {
+  return Option(option_->check(check_number<double>(
+      CLI::PositiveNumber, [](double value) { return value > 0; }, "a number above 0")));
+}
+Option Option::check_not_negative() const {
+  return Option(option_->check(check_number<double>(
+      CLI::NonNegativeNumber, [](double value) { return value >= 0; }, "a number from 0 on")));
+}
 Option Option::check_choices(const std::vector<std::string>& choices) const {
   return Option(option_->check(CLI::IsMember(choices)));
 }
@@ -66,7 +112,9 @@ Verb Verb::add_verb(std::string_view name, std::string_view description) const {
 
 template <class T>
 Option Verb::add_option(std::string_view names, T& value, std::string_view description) const {
-  return Option(app_->add_option(std::string(names), value, std::string(description)));
+  CLI::Option* const option = app_->add_option(std::string(names), value, std::string(description));
+  if constexpr (kHoldsDoubles<T>) option->check(describe_infinite);
+  return Option(option);
 }
 #define EMBERLOCK_OPTION_OF(...) \
   template Option Verb::add_option(std::string_view, __VA_ARGS__&, std::string_view) const

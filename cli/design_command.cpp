@@ -158,8 +158,10 @@ void run_design(const DesignArguments& a) {
     constexpr std::size_t kPlaces = 5;
     const evaluate::TwinRig twin = twin_of(page.law, page.request, *rig);
     page.one_more = {*rig, predict(page.law, twin), next_cameras(page.law, twin, kPlaces)};
+    page.extrapolated = evaluate::list_extrapolated(twin);
   } else {
     page.design = evaluate::design(page.law, page.request);
+    page.extrapolated = evaluate::list_extrapolated(page.design.chosen.twin);
     if (page.design.reached) measure_costs(a, others, page);
   }
   if (!a.out.empty()) or_fail(report::write_design(page, where));

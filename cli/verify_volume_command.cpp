@@ -8,12 +8,12 @@
 #include <utility>
 #include <vector>
 
-#include <fmt/chrono.h>
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 #include <nlohmann/json.hpp>
 
 #include "base/signature.h"
+#include "base/utc.h"
 #include "cli/commands.h"
 #include "cli/interrupt.h"
 #include "recon/export/certificate.h"
@@ -36,7 +36,8 @@ void line(const char* name, const std::string& words) {
 }
 
 std::string utc(std::int64_t ns) {
-  return fmt::format("{:%Y-%m-%d %H:%M:%S} UTC", fmt::gmtime(static_cast<std::time_t>(ns / 1'000'000'000)));
+  const std::string text = utc_text({ns});  // "2026-11-22T02:50:00.123Z"
+  return text.substr(0, 10) + " " + text.substr(11, 8) + " UTC";
 }
 
 std::string milliseconds(double value, double sigma) {

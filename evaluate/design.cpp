@@ -112,10 +112,10 @@ DesignedRig designed(const ErrorLaw& law, const DesignRequest& request, int came
   rig.voxels = twin_voxels(size.width);
   rig.exposure = exposure_for(law, request, cameras);
   rig.tolerance = request.tolerance;
-  TwinRig twin = seen_by(request, rig.exposure, rig.tolerance);
-  twin.towards = even_planes(cameras);
-  twin.pixel = resolved(twin_pixel(size.width));
-  rig.squares = predict(law, twin);
+  rig.twin = seen_by(request, rig.exposure, rig.tolerance);
+  rig.twin.towards = even_planes(cameras);
+  rig.twin.pixel = resolved(twin_pixel(size.width));
+  rig.squares = predict(law, rig.twin);
   rig.euros = cameras * request.camera_price;
   return rig;
 }

@@ -47,6 +47,7 @@ struct DesignedRig {
   int voxels = 0;  ///< along the longest edge of the flame's box: one for two pixels, 192 at most
   Seconds exposure{0};
   Seconds tolerance{0};
+  TwinRig twin;  ///< as the law sees it
   ErrorSquares squares{};
   double euros = 0;
   [[nodiscard]] double error() const { return total(squares); }

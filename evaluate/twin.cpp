@@ -133,6 +133,30 @@ std::vector<NamedRig> check_rigs() {
            {even_planes(14), twin_pixel(240), 0.5, rise(5, 1, 20), rise(5, 1, 2)}}};
 }
 
+std::vector<std::string> list_extrapolated(const TwinRig& rig) {
+  std::vector<NamedRig> simulated = sweep_rigs();
+  const std::vector<NamedRig> checked = check_rigs();
+  simulated.insert(simulated.end(), checked.begin(), checked.end());
+  std::vector<std::string> beyond;
+  const auto compare = [&](auto part, const char* words) {
+    double low = INFINITY, high = -INFINITY;
+    for (const NamedRig& one : simulated) {
+      low = std::min(low, part(one.rig));
+      high = std::max(high, part(one.rig));
+    }
+    const double value = part(rig);
+    const double slack = 1e-9 * high;
+    if (value >= low - slack && value <= high + slack) return;
+    beyond.push_back(fmt::format("{:.3g} {} (simulated: {:.3g} to {:.3g})", value, words, low, high));
+  };
+  compare([](const TwinRig& r) { return static_cast<double>(r.towards.size()); }, "cameras");
+  compare([](const TwinRig& r) { return twin_pixel(1) / r.pixel; }, "pixels across");
+  compare([](const TwinRig& r) { return r.noise; }, "grey levels of noise");
+  compare([](const TwinRig& r) { return r.exposed; }, "heights of rise in an exposure");
+  compare([](const TwinRig& r) { return r.late; }, "heights of rise within the tolerance");
+  return beyond;
+}
+
 Result<double> Twin::measure(const TwinRig& rig, const Clock& clock) {
   if (judges_.empty()) {
     for (const Eigen::Vector3d& towards : judge_directions())

@@ -47,6 +47,10 @@ std::vector<NamedRig> sweep_rigs();
 /// Five others, of which each differs in several: what a law is checked by.
 std::vector<NamedRig> check_rigs();
 
+/// What of a rig lies beyond all of those two lists, which a law was fitted to and checked by: "3 cameras
+/// (simulated: 4 to 16)". Empty: nothing, and the law's uncertainty() holds.
+std::vector<std::string> list_extrapolated(const TwinRig& rig);
+
 /// Every rig by twin. Errors: those of Twin::measure().
 Result<std::vector<MeasuredRig>> measure_all(Twin& twin, const std::vector<NamedRig>& rigs,
                                              const Clock& clock, const Progress& progress = {});

@@ -6,6 +6,7 @@
 #include <numbers>
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include "base/file.h"
 #include "evaluate/sync_tradeoff.h"
@@ -30,17 +31,25 @@ std::string error_words(const DesignPage& page, double error) {
   return fmt::format("{:.2f} +- {:.2f} grey levels", error, evaluate::uncertainty(page.law) * error);
 }
 
+/// " The law extrapolates: ..."; nothing where it doesn't.
+std::string extrapolation_words(const DesignPage& page) {
+  if (page.extrapolated.empty()) return {};
+  return fmt::format(" The law extrapolates, so the error may be further off than stated: {}.",
+                     fmt::join(page.extrapolated, ", "));
+}
+
 std::string verdict(const DesignPage& page) {
   if (page.one_more)
-    return fmt::format("The rig of {} cameras is predicted to err by {}.", page.one_more->rig.towards.size(),
-                       error_words(page, total(page.one_more->now)));
+    return fmt::format("The rig of {} cameras is predicted to err by {}.{}",
+                       page.one_more->rig.towards.size(), error_words(page, total(page.one_more->now)),
+                       extrapolation_words(page));
   const DesignedRig& rig = page.design.chosen;
   const std::string words =
       page.design.reached
           ? fmt::format("The cheapest rig for {:g} grey levels", page.request.target)
           : fmt::format("No rig reaches {:g} grey levels. The most accurate", page.request.target);
-  return fmt::format("{}: {}. Predicted: {} for {:g} EUR of cameras.", words, rig_words(rig),
-                     error_words(page, rig.error()), rig.euros);
+  return fmt::format("{}: {}. Predicted: {} for {:g} EUR of cameras.{}", words, rig_words(rig),
+                     error_words(page, rig.error()), rig.euros, extrapolation_words(page));
 }
 
 double degrees(double radians) { return radians * 180 / std::numbers::pi; }
@@ -251,6 +260,7 @@ nlohmann::ordered_json design_json(const DesignPage& page) {
                               {"law", {{"reach", page.law.reach}, {"spread", page.law.spread}}}};
   for (const ErrorPart part : evaluate::kAllErrorParts)
     json["law"]["strength"][std::string(name(part))] = page.law.strength[static_cast<std::size_t>(part)];
+  json["law"]["extrapolated"] = page.extrapolated;
   if (page.one_more) {
     json["rig"] = squares_json(page.one_more->now);
     json["rig"]["cameras"] = page.one_more->rig.towards.size();

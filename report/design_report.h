@@ -36,7 +36,8 @@ struct DesignPage {
   evaluate::Design design;                      ///< where no rig was given
   std::optional<evaluate::Recording> recording;
   std::vector<MachineMinutes> machines;
-  std::optional<OneMore> one_more;  ///< instead of all four above
+  std::optional<OneMore> one_more;        ///< instead of all four above
+  std::vector<std::string> extrapolated;  ///< evaluate::list_extrapolated() of the rig, chosen or standing
 };
 
 /// What the terminal shows.

@@ -17,6 +17,7 @@ TEST(Nearest, IsWhatWasProbablyMeant) {
 TEST(Nearest, IsNothingWhereNothingIsSimilar) {
   EXPECT_EQ(nearest("frobnicate", {"align", "status"}), std::nullopt);
   EXPECT_EQ(nearest("align", {}), std::nullopt);
+  EXPECT_EQ(nearest("x", {"", "align"}), std::nullopt);
   EXPECT_EQ(nearest(std::string(std::size_t{1} << 20U, 'a'), {"align"}), std::nullopt);
 }
 

@@ -55,6 +55,31 @@ TEST(DesignSlow, MoreCamerasAndFinerPicturesAreNeverPredictedWorse) {
               designed(kLaw, request(5), 8, sizes[i - 1]).error());
 }
 
+/// No rig that a law is fitted to or checked by; each of its quantities on both sides of what they span.
+TEST(DesignExtrapolation, IsNamedOutsideOfWhatWasSimulated) {
+  for (const auto& rigs : {sweep_rigs(), check_rigs()})
+    for (const NamedRig& one : rigs) EXPECT_THAT(list_extrapolated(one.rig), testing::IsEmpty()) << one.name;
+  const TwinRig base = sweep_rigs().front().rig;
+  const auto named = [&](const auto& change) {
+    TwinRig rig = base;
+    change(rig);
+    const std::vector<std::string> all = list_extrapolated(rig);
+    return all.size() == 1 ? all.front() : std::to_string(all.size());
+  };
+  for (const int cameras : {3, 17, 32})
+    EXPECT_EQ(named([&](TwinRig& r) { r.towards = even_planes(cameras); }),
+              std::to_string(cameras) + " cameras (simulated: 4 to 16)");
+  for (const int width : {40, 241, 640})
+    EXPECT_THAT(named([&](TwinRig& r) { r.pixel = twin_pixel(width); }), HasSubstr("(simulated: 48 to 240)"));
+  for (const double noise : {5.1, 50.0})
+    EXPECT_THAT(named([&](TwinRig& r) { r.noise = noise; }),
+                HasSubstr("grey levels of noise (simulated: 0 to 5)"));
+  for (const double rise : {0.151, 3.0})
+    EXPECT_THAT(named([&](TwinRig& r) { r.exposed = rise; }), HasSubstr("in an exposure"));
+  for (const double rise : {0.061, 3.0})
+    EXPECT_THAT(named([&](TwinRig& r) { r.late = rise; }), HasSubstr("within the tolerance"));
+}
+
 TEST(DesignSlow, AnImpossibleTargetGivesTheMostAccurate) {
   const Design d = design(kLaw, request(0.5));
   EXPECT_FALSE(d.reached);

@@ -52,10 +52,13 @@ class ArCommandTest : public testing::Test {
     ASSERT_TRUE(recon::write_volume(volume, temp_ / name / "volume.vdb").ok());
   }
   /// `hidden`: from this frame on the marker is covered.
-  void put_film(const std::string& name, int frames, int hidden) const {
+  void put_film(const std::string& name, int frames, int hidden,
+                const session::VideoDisplay& display = {}) const {
+    using Coding = session::VideoWriter::Coding;
     const test::Plate plate(test::usual_marker());
-    auto film = session::VideoWriter::create(temp_ / name, {kFilmed, PixelFormat::rgb8, 8}, Hertz(30), 0,
-                                             session::VideoWriter::Coding::lossless);
+    auto film =
+        session::VideoWriter::create(temp_ / name, {kFilmed, PixelFormat::rgb8, 8}, Hertz(30), 0,
+                                     name.ends_with("mp4") ? Coding::for_players : Coding::lossless, display);
     ASSERT_TRUE(film.ok());
     for (int f = 0; f < frames; ++f) {
       test::PlateLook look;
@@ -114,6 +117,29 @@ TEST_F(ArCommandTest, AVideoHasTheFilmsRate) {
   ASSERT_TRUE(film.ok());
   EXPECT_EQ(film->times().size(), 10U);
   EXPECT_NEAR(film->rate().value(), 30, 0.5);
+}
+
+TEST_F(ArCommandTest, AVideoIsShownAsTheFilmIs) {
+  constexpr std::int32_t k1 = 1 << 16;
+  const session::VideoDisplay phone{{{0, k1, 0, -k1, 0, 0, 0, 0, 1 << 30}}, 4, 3};
+  put_film("phone.mp4", 3, 3, phone);
+  const std::vector<std::string> lens{"--rig", (temp_ / "rig.json").string(), "--format"};
+  for (const char* format : {"mp4", "ffv1", "png"}) {
+    std::vector<std::string> words = lens;
+    words.emplace_back(format);
+    const auto done = run(words, "phone.mp4");
+    ASSERT_EQ(done.exit_code, 0) << done.err;
+    const bool turned_note = done.out.find("display matrix isn't copied") != std::string::npos;
+    EXPECT_EQ(turned_note, format != std::string("mp4"));
+    EXPECT_EQ(done.out.find("4:3") != std::string::npos, format == std::string("png"));
+    if (format != std::string("png")) {
+      const auto film = ArFilm::of_video(out_ / (format == std::string("mp4") ? "ar.mp4" : "ar.mkv"));
+      ASSERT_TRUE(film.ok());
+      EXPECT_EQ(film->display().matrix.has_value(), format == std::string("mp4"));
+      EXPECT_FALSE(film->display().square());
+    }
+    fs::remove_all(out_);
+  }
 }
 
 using ArCommandSlow = ArCommandTest;

@@ -45,10 +45,8 @@ ordered_json preprocessing_json(const Report& report) {
 ordered_json views_json(const Report& report) {
   auto views = ordered_json::array();
   for (const ViewReport& view : report.views) {
-    views.push_back({{"index", views.size()},
-                     {"name", view.name},
-                     {"role", name(view.role)},
-                     {"rmse", view.rmse}});
+    views.push_back(
+        {{"index", views.size()}, {"name", view.name}, {"role", name(view.role)}, {"rmse", view.rmse}});
   }
   return views;
 }

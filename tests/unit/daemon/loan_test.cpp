@@ -65,10 +65,14 @@ TEST(Loan, BelongsToACertificateAndNotToAName) {
           const bool twin = has.name == comes.name && !(has == comes);
           const auto heard = loan.hear(comes, at(t));
           EXPECT_EQ(heard.ok(), lapsed || !twin) << row;
-          if (heard.ok()) EXPECT_EQ(*heard, has == comes && !lapsed) << row;
+          if (heard.ok()) {
+            EXPECT_EQ(*heard, has == comes && !lapsed) << row;
+          }
           const Status taken = loan.take(comes, at(t));
           EXPECT_EQ(taken.ok(), lapsed || has == comes) << row;
-          if (!taken.ok() && twin) EXPECT_THAT(taken.error().message(), HasSubstr("[rig]")) << row;
+          if (!taken.ok() && twin) {
+            EXPECT_THAT(taken.error().message(), HasSubstr("[rig]")) << row;
+          }
         }
 }
 

@@ -82,7 +82,9 @@ TEST_F(ServerExportsTest, APartOfAFileIsSentAsItIsAskedFor) {
   const auto expect = [&](const std::string& header, Kind kind, const std::string& part) {
     const RangeRequest asked = parse_range(header, bytes.size());
     EXPECT_EQ(asked.kind, kind) << header;
-    if (kind == Kind::part) EXPECT_EQ(bytes.substr(asked.range.first, asked.range.length), part) << header;
+    if (kind == Kind::part) {
+      EXPECT_EQ(bytes.substr(asked.range.first, asked.range.length), part) << header;
+    }
   };
   for (std::size_t first = 0; first <= 12; ++first) {
     const bool begins = first < bytes.size();

@@ -109,12 +109,15 @@ TEST(TransformsFields, AValueThatChangesNothingIsAccepted) {
       {"units", "m"},     {"distortion_params", json::array({0, 0, 0, 0})},
       {"unit", "Metres"}, {"rolling_shutter", json::array({0, 0, 0})},
       {"s1", 0},          {"latlong", false}};
-  for (const auto& [key, value] : rows) EXPECT_TRUE(parse_fields(with_field({key}, value)).ok()) << key << value;
+  for (const auto& [key, value] : rows)
+    EXPECT_TRUE(parse_fields(with_field({key}, value)).ok()) << key << value;
   for (const char* model :
        {"OPENCV_FISHEYE", "RADIAL_FISHEYE", "SIMPLE_RADIAL_FISHEYE", "THIN_PRISM_FISHEYE"})
-    EXPECT_THAT(parse_fields(with_field({"camera_model"}, model)), FailsWith("camera_model", "fisheye")) << model;
+    EXPECT_THAT(parse_fields(with_field({"camera_model"}, model)), FailsWith("camera_model", "fisheye"))
+        << model;
   for (const char* model : {"FOV", "EQUIRECTANGULAR", "ORTHOPHOTO", ""})
-    EXPECT_THAT(parse_fields(with_field({"camera_model"}, model)), FailsWith("camera_model", "no pinhole")) << model;
+    EXPECT_THAT(parse_fields(with_field({"camera_model"}, model)), FailsWith("camera_model", "no pinhole"))
+        << model;
 }
 
 TEST(TransformsFields, AMisspelledKeyIsRefusedWithTheOneThatWasMeant) {

@@ -266,6 +266,7 @@ Status write_joined(const fs::path& folder, const v1::Manifest& manifest,
 /// A part may have been damaged since it was recorded: the first of its faults, by its own folder.
 Status expect_whole(const fs::path& joined, const JoinPlan& plan, const Observer& observer) {
   EMBERLOCK_ASSIGN_OR_RETURN(const SessionCheck check, verify_session(joined, observer));
+  EMBERLOCK_RETURN_IF_ERROR(observe(observer, 1, "read back"));
   if (check.readable) return {};
   const auto damaged = [](const fs::path& part, const std::string& what) {
     return Error{ErrorKind::refused, what, part.string(),

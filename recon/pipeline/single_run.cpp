@@ -230,8 +230,8 @@ Status check_explained(Report& report) {
         "less than a tenth of the light is explained: the volume leaves nearly the error of no light in " +
             which,
         "views",
-        "Check that these pictures show the flame, and the cameras' poses and the box (--plan DIR shows "
-        "them on the pictures)"};
+        "Check that these pictures show the flame, the cameras' poses and the box (--plan DIR shows them on "
+        "the pictures), and give enough voxels and iterations"};
   report.warnings.insert(
       report.warnings.begin(),
       fmt::format(

@@ -22,7 +22,7 @@ namespace fs = std::filesystem;
 using testing::HasSubstr;
 using testing::Not;
 
-class DemoTest : public testing::Test {
+class DemoTestSlow : public testing::Test {
  protected:
   static void SetUpTestSuite() {
     folder_ = new test::TempFolder;
@@ -45,10 +45,10 @@ class DemoTest : public testing::Test {
   static test::TempFolder* folder_;
   static Result<rig::DemoResult>* result_;
 };
-test::TempFolder* DemoTest::folder_;
-Result<rig::DemoResult>* DemoTest::result_ = nullptr;
+test::TempFolder* DemoTestSlow::folder_;
+Result<rig::DemoResult>* DemoTestSlow::result_ = nullptr;
 
-TEST_F(DemoTest, EveryCameraEndsWithinTheToleranceInTruth) {
+TEST_F(DemoTestSlow, EveryCameraEndsWithinTheToleranceInTruth) {
   for (const rig::AlignStage& stage : result().stages) {
     for (const auto& error : stage.errors.back()) {
       ASSERT_TRUE(error.has_value());
@@ -59,7 +59,7 @@ TEST_F(DemoTest, EveryCameraEndsWithinTheToleranceInTruth) {
   EXPECT_LE(result().true_worst_pair, Rows(21) * result().true_row_times[0]);
 }
 
-TEST_F(DemoTest, RowTimesAreMeasuredNotAssumed) {
+TEST_F(DemoTestSlow, RowTimesAreMeasuredNotAssumed) {
   ASSERT_EQ(result().row_clocks.size(), 6U);
   for (std::size_t i = 0; i < 6; ++i) {
     const smear::RowClock& clock = result().row_clocks[i];
@@ -69,14 +69,14 @@ TEST_F(DemoTest, RowTimesAreMeasuredNotAssumed) {
   }
 }
 
-TEST_F(DemoTest, TheRecordedAlignmentReplaysToTheSameEnd) {
+TEST_F(DemoTestSlow, TheRecordedAlignmentReplaysToTheSameEnd) {
   const auto replayed = rig::replay_align(*folder_ / "alignment");
   ASSERT_TRUE(replayed.ok()) << replayed.error().message();
   EXPECT_EQ(replayed->resets, result().stages.back().result.resets);
   EXPECT_EQ(replayed->last.worst_pair, result().stages.back().result.last.worst_pair);
 }
 
-TEST_F(DemoTest, EveryFrameOfTheFlameIsRecordedAndReadable) {
+TEST_F(DemoTestSlow, EveryFrameOfTheFlameIsRecordedAndReadable) {
   auto session = session::SessionReader::open(*folder_ / "flame");
   ASSERT_TRUE(session.ok()) << session.error().message();
   ASSERT_EQ(session->camera_count(), 6U);
@@ -86,7 +86,7 @@ TEST_F(DemoTest, EveryFrameOfTheFlameIsRecordedAndReadable) {
   }
 }
 
-TEST_F(DemoTest, TheUnseenViewIsPredictedBetterThanByThePapersSolver) {
+TEST_F(DemoTestSlow, TheUnseenViewIsPredictedBetterThanByThePapersSolver) {
   const auto held_out = result().outcome.report.heldout_rmse;
   ASSERT_TRUE(held_out.has_value());
   EXPECT_LT(recon::all_channels(*held_out), recon::all_channels(*result().paper.report.heldout_rmse));
@@ -97,7 +97,7 @@ TEST_F(DemoTest, TheUnseenViewIsPredictedBetterThanByThePapersSolver) {
       << "less than half the error of a black picture";
 }
 
-TEST_F(DemoTest, TheReportStandsAlone) {
+TEST_F(DemoTestSlow, TheReportStandsAlone) {
   ASSERT_TRUE(report::write_demo_report(result(), *folder_).ok());
   std::string page = read_file(*folder_ / "report.html").value();
   for (std::size_t at = 0; (at = page.find("base64,", at)) != std::string::npos; ++at) {

@@ -57,7 +57,7 @@ TEST_F(FileHashTest, DoesNotDependOnHowTheBytesComeAndAFilesIsThatOfItsBytes) {
   EXPECT_EQ(seen, 1);
   EXPECT_EQ(hash_file(folder_ / "file", [](double, std::string_view) { return false; }).error().kind,
             ErrorKind::refused);
-  EXPECT_EQ(hash_file(folder_ / "none").error().kind, ErrorKind::io);
+  EXPECT_EQ(hash_file(folder_ / "none").error().kind, ErrorKind::bad_input);
 }
 
 // RFC 8032, 7.1, TEST 2.

@@ -304,7 +304,7 @@ TEST_F(ReconstructCommandTest, WithoutVoxelsItTakesTheKneeAndSaysHowToAskForMore
 }
 
 TEST_F(ReconstructCommandTest, ThePapersSolverSaysWhereItIsNotThePapers) {
-  const Run result = run({"--solver", "paper", "--voxels", "12", "--iterations", "2", "--device", "cpu"});
+  const Run result = run({"--solver", "paper", "--voxels", "12", "--iterations", "12", "--device", "cpu"});
   ASSERT_EQ(result.exit_code, 0) << result.err;
   EXPECT_THAT(result.out, HasSubstr("T starts at the hull, not at the volume's face; "));
   EXPECT_GE(report()["deviations"].size(), 6U);
@@ -541,10 +541,16 @@ TEST_F(ReconstructCommandTest, ASingularMatrixIsNamed) {
   expect_refused(run({}), "frames[3].transform_matrix");
 }
 
-TEST_F(ReconstructCommandTest, AnUnknownKeyIsNamed) {
-  document_["frames"][2]["exposure"] = 3;
+TEST_F(ReconstructCommandTest, AnUnknownKeyIsNamedAndAMisspeltOneRefused) {
+  document_["frames"][2]["file_pathe"] = 3;
   save();
-  expect_refused(run({}), "frames[2].exposure");
+  expect_refused(run({}), "frames[2].file_pathe");
+  document_["frames"][2].erase("file_pathe");
+  document_["frames"][2]["shutter_count"] = 3;
+  save();
+  const Run result = run({"--voxels", "12", "--effects", "none", "--device", "cpu"});
+  EXPECT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_THAT(result.out, HasSubstr("shutter_count"));
 }
 
 TEST_F(ReconstructCommandTest, ATruncatedPictureIsNamed) {

@@ -97,7 +97,7 @@ TEST_F(VerifyVolumeTest, WhatDoesNotHoldExitsWithOneAndWhatIsNotThereWithTwo) {
               HasSubstr("the volume isn't of a session"));
   EXPECT_THAT(verify(volume_of_session(nullptr), {"--session", session_.string()}).err,
               HasSubstr("they were left out"));
-  EXPECT_EQ(verify(folder_ / "no.vdb").exit_code, 1);
+  EXPECT_EQ(verify(folder_ / "no.vdb").exit_code, 2);
 }
 
 TEST_F(VerifyVolumeTest, TheTrustedKeyMustHaveSigned) {

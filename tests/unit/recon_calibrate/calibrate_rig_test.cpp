@@ -171,23 +171,6 @@ TEST(CalibrateRigSlow, MirroredCamerasAreNamedAndTheOthersSolvedWithoutThem) {
   }
 }
 
-TEST(CalibrateRig, ACameraOfOtherInstantsIsNamed) {
-  test::BoardRig rig = test::board_rig(small_rig(3, 20));
-  std::vector<BoardSightings::Sighting*> views;
-  for (auto& sighting : rig.sightings.sightings)
-    if (sighting.camera == 1) views.push_back(&sighting);
-  for (std::size_t i = 0; 2 * i < views.size(); ++i)
-    std::swap(views[i]->corners, views[views.size() - 1 - i]->corners);
-  const auto found = value_of(calibrate_rig(rig.sightings));
-  EXPECT_FALSE(found.whole());
-  EXPECT_FALSE(found.cameras[1].placed);
-  EXPECT_TRUE(found.cameras[1].calibrated) << "its lens is its own";
-  EXPECT_THAT(found.cameras[1].why, HasSubstr("at one instant"));
-  EXPECT_TRUE(found.cameras[0].placed);
-  EXPECT_TRUE(found.cameras[2].placed);
-  EXPECT_LT(rms_of(found.bundle), 0.5);
-}
-
 TEST(CalibrateRig, CornersThatNoLensFitsAreRefused) {
   test::BoardRigOptions options = small_rig(2, 12);
   options.noise = 4;

@@ -305,7 +305,7 @@ TEST_P(Reconstruct, ToldToStopItEndsWithTheBestSoFar) {
 TEST_P(Reconstruct, ThePapersSolverTakesThePapersOpacityUnlessToldOtherwise) {
   ReconstructOptions options = quick();
   options.solve.solver = Solver::paper;
-  options.solve.iterations = 2;
+  options.solve.iterations = 12;
   options.effects.reset();
   const Outcome published = outcome_of(ball(), options);
   const double edge = published.report.voxel_edge.value();
@@ -317,12 +317,12 @@ TEST_P(Reconstruct, ThePapersSolverTakesThePapersOpacityUnlessToldOtherwise) {
   EXPECT_EQ(told.reconstruction.effects.extinction.value.value(), 0);
 }
 
-TEST_P(Reconstruct, AnEmptyHullNamesTheRemedy) {
+TEST_P(Reconstruct, BlackViewsAreNamedWithTheRemedy) {
   Scene scene = ball();
-  scene.views[1].image = share(RadianceImage({80, 60}));
+  for (std::size_t v = 1; v < scene.views.size(); ++v) scene.views[v].image = share(RadianceImage({80, 60}));
   const auto outcome = run(scene, quick());
   ASSERT_THAT(outcome, FailsWith("camera 1"));
-  EXPECT_EQ(outcome.error().kind, ErrorKind::bad_input);
+  EXPECT_EQ(outcome.error().kind, ErrorKind::not_converged);
   EXPECT_FALSE(outcome.error().remedy.empty());
 }
 
@@ -362,11 +362,10 @@ TEST_P(Reconstruct, VoxelsOutOfRangeAndNonFinitePicturesAreRefused) {
   EXPECT_THAT(run(scene, quick()), FailsWith("camera 4"));
 }
 
-TEST_P(Reconstruct, OneVoxelIsEnough) {
+TEST_P(Reconstruct, OneVoxelExplainsTooLittle) {
   ReconstructOptions options = quick();
   options.voxels = 1;
-  const Outcome outcome = outcome_of(ball(), options);
-  EXPECT_EQ(outcome.report.voxels, (std::array{1, 1, 1}));
+  EXPECT_THAT(run(ball(), options), FailsWith("less than a tenth of the light"));
 }
 
 class OutcomeTest : public OnEachDevice {

@@ -147,6 +147,7 @@ void write_with(const openvdb::MetaMap& about, const fs::path& path) {
   from.close();
   openvdb::io::File(path.string()).write(*grids, about);
   std::ofstream(path, std::ios::binary | std::ios::app) << "emberlock: end of volume";
+  identify_by_content(path);  // as the volumes of its version are
 }
 
 TEST_F(SharedFiles, LightThatAFileTellsInAnotherWayIsRefused) {

@@ -238,6 +238,7 @@ TEST_P(VoxelChoiceTest, ThePapersRuleAndThePapersSolverMeasureNothing) {
   EXPECT_EQ(by_rule.report.voxel_choice.rule, "paper");
   options.rule = VoxelRule::knee;
   options.solve.solver = Solver::paper;
+  options.solve.iterations = 12;
   const auto by_solver = value_of(reconstruct(pictures(), options, SlowClock(Seconds(1e-6))));
   EXPECT_EQ(by_solver.report.voxels[0], finest_voxels(pictures()));
   EXPECT_EQ(by_solver.report.voxel_choice.rule, "finest");

@@ -236,8 +236,9 @@ std::set<std::string> files_that_call(const std::vector<std::string>& calls) {
 /// unfinished work is known by its content too; a batch's ledger is renames, in a folder that it made,
 /// from which a damaged chunk's list is removed.
 TEST(House, OnlyOutputFolderReplacesAndRemovesFolders) {
-  EXPECT_EQ(files_that_call({"remove_all(", "rename(", "rmdir(", "unlink("}),
-            (std::set<std::string>{"cli/batch_result.cpp", "films/import_parts.cpp", "recon/batch/ledger.cpp"}));
+  EXPECT_EQ(
+      files_that_call({"remove_all(", "rename(", "rmdir(", "unlink("}),
+      (std::set<std::string>{"cli/batch_result.cpp", "films/import_parts.cpp", "recon/batch/ledger.cpp"}));
   // These fill a folder that OutputFolder made.
   EXPECT_EQ(files_that_call({"create_director"}),
             (std::set<std::string>{"report/box_pictures.cpp", "films/import_parts.cpp",

@@ -18,6 +18,7 @@
 
 #include "base/file.h"
 #include "recon/export/nanovdb_file.h"
+#include "recon/export/vdb_identity.h"
 #include "recon/export/volume_file.h"
 #include "recon/export/vti_file.h"
 #include "tests/support/key_points.h"

@@ -353,19 +353,6 @@ void take_together(const Asked& asked, Emitter emitter, Readings& readings) {
   }
 }
 
-/// Voxels blend what is hot with what is cold. What one more voxel's blend changes, as it is read by itself,
-/// is part of each temperature's error: much where a flame is a few voxels thick.
-void doubt_resolution(const Asked& asked, Emitter emitter, const std::vector<float>& read,
-                      Readings& readings) {
-  const Reconstruction coarser = blended(asked.done);
-  const Readings other =
-      read_all({asked.scene, coarser, asked.errors, asked.response, asked.options, asked.elapsed}, emitter);
-  add_error(readings, [&](std::size_t p) {
-    const float blend = other.field.kelvin[p];
-    return blend > 0 && read[p] > 0 ? blend - read[p] : 0.0F;
-  });
-}
-
 /// By Kirchhoff's law: what absorbs emits. A place's brightness fixes its absorption better than pictures
 /// of what lies behind it do.
 void find_absorption(const Asked& asked, Emitter emitter, TemperatureField& field) {
@@ -422,11 +409,7 @@ TemperatureField temperature_of(const Scene& scene, const Reconstruction& done, 
     }
     for (const LineEmitter* rival : choice.rivals) read.field.summary.lines_alike.emplace_back(rival->name);
   }
-  const std::vector<float> by_voxel = read.field.kelvin;
-  if (!paper && named.empty()) {
-    take_together(asked, emitter, read);
-    doubt_resolution(asked, emitter, by_voxel, read);
-  }
+  if (!paper && named.empty()) take_together(asked, emitter, read);
   read.field.summary.lines_automatic = lines.automatic;
   read.field.summary.lines_tried = lines.automatic && !others.empty();
   read.field.summary.emitter_told = told.has_value();

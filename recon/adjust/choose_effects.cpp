@@ -26,8 +26,9 @@ std::string explain(const EstimatedExtinction& estimate) {
                            : even <= 0      ? fmt::format("{:.3g} / m like soot", soot)
                                        : fmt::format("{:.3g} / m even and {:.3g} / m like soot", even, soot);
   return fmt::format(
-      "{} shows pixels and views that are left out of a coarse fit best, to {:.3g} grey levels", what,
-      estimate.error);
+      "{} shows pixels and views that are left out of a coarse fit best, to {:.3g} grey levels and {:.3g} "
+      "without",
+      what, estimate.error, estimate.error_of_none);
 }
 
 /// Estimates the extinction on a grid of its own and makes the report's line of it.

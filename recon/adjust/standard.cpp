@@ -70,7 +70,7 @@ Beginning begin_coarse_to_fine(const SolverSetup& setup, Tracker& tracker) {
     const bool is_dark = !begun.descent;
     begun.descent = begin(*finer, setup, is_dark ? nullptr : &begun.descent->engine());
     begun.level = std::move(finer);
-    if (is_dark && setup.effects.extinction.soot.value() > 0) {  // light distributes it, and there was none
+    if (is_dark && l == 0 && setup.effects.extinction.soot.value() > 0) {  // light distributes it
       for (int s = 0; s < kCoarseSteps && !tracker.out_of_time(); s += begun.level->subsets)
         begun.descent->pass();
       begun.descent = begin(*begun.level, setup, &begun.descent->engine());

@@ -16,8 +16,8 @@ PreparedScene under_known_effects(const PreparedScene& filmed, const EffectReque
 /// it takes those and only predicts their change, but for the scale of an extinction field, which it
 /// estimates. Otherwise the extinction is estimated by cross-validation on a grid of its own
 /// (find_extinction.h), so that it doesn't depend on `grid`; it stays off unless it lowers the validation
-/// error by a tenth. An effect whose predicted change lies below the tolerance is off. Errors: a gamma
-/// for pictures that are linearised; a device that can't run; no hull.
+/// error by a twentieth, on that grid and on one twice as fine. An effect whose predicted change lies below
+/// the tolerance is off. Errors: a gamma for pictures that are linearised; a device that can't run; no hull.
 Result<EffectChoice> choose_effects(const PreparedScene& scene, const Grid& grid,
                                     const EffectRequest& request, const SolveOptions& options,
                                     const Elapsed& elapsed = {});

@@ -35,8 +35,9 @@ Extinction guess(PerMeter mean, double soot) {
 /// that is free would also explain what the grid is too coarse to show.
 class Probe {
  public:
-  explicit Probe(const SolverSetup& setup) : setup_(setup) {
-    const int stride = stride_for_rays(setup, kPixels);
+  static constexpr std::size_t kPixels = 20000;
+  explicit Probe(const SolverSetup& setup, std::size_t pixels = kPixels) : setup_(setup) {
+    const int stride = stride_for_rays(setup, pixels);
     levels_.push_back(make_level(setup, setup.hull, stride, 4));
     const std::size_t views = setup.views.size();
     const std::size_t folds = views > kFewestFitted ? std::min(kMostFolds, views) : 0;
@@ -70,7 +71,6 @@ class Probe {
   }
 
  private:
-  static constexpr std::size_t kPixels = 20000;
   static constexpr std::size_t kMostFolds = 4;
   static constexpr std::size_t kFewestFitted = 2;  // views
   static constexpr int kSteps = 24;                // twice
@@ -159,19 +159,20 @@ Box box_around(const Grid& g) {
 
 }  // namespace
 
-Result<Hull> carve_probe(const SolverSetup& setup, const Scene& linear, const std::vector<FlameMask>& masks) {
+Result<Hull> carve_probe(const SolverSetup& setup, const Scene& linear, const std::vector<FlameMask>& masks,
+                         double refinement) {
   constexpr int kFirst = 32;
-  constexpr double kProbeVoxels = 4000;
-  constexpr int kRounds = 2;             // the first coarse hull is larger than the medium
-  constexpr double kPixelsPerVoxel = 2;  // fewer leave voxels that hang on hardly any ray
+  const double probe_voxels = 4000 * std::pow(refinement, 3);
+  constexpr int kRounds = 2;                    // the first coarse hull is larger than the medium
+  const double pixels_wanted = 2 / refinement;  // fewer leave voxels that hang on hardly any ray
   const ComputeOptions& compute = setup.options.compute;
   EMBERLOCK_ASSIGN_OR_RETURN(Hull hull, carve(linear, masks, grid_over(linear.box, kFirst), compute));
   for (int round = 0; round < kRounds; ++round) {
     const Grid cropped = crop_to_medium(hull).hull.grid;
     const Box box = box_around(cropped);
     const auto edge = static_cast<double>(cropped.edge);
-    const double smallest = edge * std::max(std::cbrt(static_cast<double>(hull.count) / kProbeVoxels),
-                                            kPixelsPerVoxel / pixels_per_voxel(setup, cropped));
+    const double smallest = edge * std::max(std::cbrt(static_cast<double>(hull.count) / probe_voxels),
+                                            pixels_wanted / pixels_per_voxel(setup, cropped));
     const double voxels = std::clamp(box.size.maxCoeff() / smallest, 8.0, 128.0);
     auto finer = carve(linear, masks, grid_over(box, static_cast<int>(std::lround(voxels))), compute);
     if (!finer.ok()) break;
@@ -205,6 +206,11 @@ EstimatedExtinction find_extinction(const SolverSetup& probing, bool forced, con
   EstimatedExtinction estimate = best_of(std::move(candidates));
   estimate.error_of_none = none.error;
   return estimate;
+}
+
+EstimatedExtinction score_closer(const SolverSetup& closer, const Extinction& extinction) {
+  const Probe probe(closer, 4 * Probe::kPixels);
+  return {extinction, probe.score(extinction).error, probe.score({}).error};
 }
 
 CoarseSolution try_extinction(const SolverSetup& setup, const Extinction& extinction) {

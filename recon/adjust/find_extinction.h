@@ -10,7 +10,9 @@ namespace emberlock::recon {
 /// A hull of about 4000 voxels over the medium's own bounds, whatever grid a run asks for, so that a choice
 /// made on it doesn't depend on that grid. It is coarser where the pictures of `setup.views` don't resolve
 /// that many. Errors: those of carve().
-Result<Hull> carve_probe(const SolverSetup& setup, const Scene& linear, const std::vector<FlameMask>& masks);
+/// `refinement` times as many voxels along each side.
+Result<Hull> carve_probe(const SolverSetup& setup, const Scene& linear, const std::vector<FlameMask>& masks,
+                         double refinement = 1);
 
 /// The extinction estimated from the pictures.
 struct EstimatedExtinction {
@@ -31,6 +33,9 @@ struct EstimatedExtinction {
 ///
 /// With a budget, the search ends when it has used a third of it.
 EstimatedExtinction find_extinction(const SolverSetup& probing, bool forced, const Elapsed& elapsed = {});
+
+/// The validation errors of an extinction and of none on a finer hull and four times as many pixels.
+EstimatedExtinction score_closer(const SolverSetup& closer, const Extinction& extinction);
 
 /// A rough solution with a given extinction.
 struct CoarseSolution {

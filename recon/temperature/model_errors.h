@@ -3,15 +3,10 @@
 
 #include <vector>
 
-#include "recon/adjust/solver.h"
 #include "recon/temperature/thermometer.h"
 
 // What the model of a glow leaves out, as errors of the temperatures that are read by it.
 namespace emberlock::recon {
-
-/// The same with what glows at each key point and its 26 neighbours averaged, weighted by 1/2 for each step,
-/// as voxels blend hot and cold. Dark points stay dark, and count nowhere.
-Reconstruction blended(const Reconstruction& done);
 
 /// By how much soot of a constant E(m) is read too hot, at what is read: which dispersion a flame's soot has
 /// isn't known.

@@ -22,15 +22,6 @@ std::uint32_t big_endian32(std::string_view s, std::size_t i) {
   return big_endian16(s, i) << 16 | big_endian16(s, i + 2);
 }
 
-Error cut_short(const std::string& where, std::string_view kind) {
-  return {ErrorKind::bad_input, "the " + std::string(kind) + " is truncated", where,
-          "Copy or record it again"};
-}
-Error broken(const std::string& where, std::string_view kind, std::string_view reason) {
-  return {ErrorKind::bad_input, "the " + std::string(kind) + " is damaged: " + std::string(reason), where,
-          "Copy or record it again"};
-}
-
 /// The directories of a TIFF, or of the TIFF structure within an EXIF block. Reads beyond the end give 0.
 class TiffReader {
  public:
@@ -98,7 +89,7 @@ std::uint32_t grey_key(std::string_view s, std::size_t chunk) {
 
 /// Walks the chunks of a PNG to its end.
 Result<StillContents> examine_png(std::string_view s, const std::string& where) {
-  if (s.size() < 33) return cut_short(where, "PNG");
+  if (s.size() < 33) return truncated_picture(where, "PNG");
   const std::uint32_t colours =
       byte_of(s, 25);  // 0 grey, 2 RGB, 3 palette, 4 grey and alpha, 6 RGB and alpha
   StillContents found;
@@ -127,7 +118,7 @@ Result<StillContents> examine_png(std::string_view s, const std::string& where) 
     }
     at += 12 + length;
   }
-  return cut_short(where, "PNG");
+  return truncated_picture(where, "PNG");
 }
 
 struct Jpeg {
@@ -152,7 +143,7 @@ Result<Jpeg> walk_jpeg(std::string_view s, const std::string& where) {
   Jpeg jpeg;
   bool scanned = false;
   for (std::size_t at = 2; at + 2 <= s.size();) {
-    if (byte_of(s, at) != 0xff) return broken(where, "JPEG", "a marker is missing");
+    if (byte_of(s, at) != 0xff) return damaged_picture(where, "JPEG", "a marker is missing");
     const std::uint32_t marker = byte_of(s, at + 1);
     if (marker == 0xff) {  // fill byte
       ++at;
@@ -176,11 +167,11 @@ Result<Jpeg> walk_jpeg(std::string_view s, const std::string& where) {
     if (marker == 0xe2 && segment.starts_with(std::string_view("MPF\0", 4))) jpeg.indexed = true;
     at += 2 + length;
     if (marker != 0xda) continue;
-    if (jpeg.width == 0) return broken(where, "JPEG", "no size before the first scan");
+    if (jpeg.width == 0) return damaged_picture(where, "JPEG", "no size before the first scan");
     scanned = true;
     at = end_of_scan(s, at);
   }
-  return cut_short(where, "JPEG");
+  return truncated_picture(where, "JPEG");
 }
 
 Result<StillContents> examine_jpegs(std::string_view s, const std::string& where) {
@@ -233,7 +224,7 @@ Result<StillContents> examine_tiff(std::string_view s, const std::string& where)
   StillContents found;
   std::set<std::size_t> seen;
   std::size_t at = tiff.get32(4);
-  if (s.size() < 8 || !tiff.has_directory(at)) return cut_short(where, "TIFF");
+  if (s.size() < 8 || !tiff.has_directory(at)) return truncated_picture(where, "TIFF");
   const auto take = [&](std::size_t page) {
     found.pictures.push_back({page, s.size(), tiff.value(page, kWidth, 0), tiff.value(page, kHeight, 0),
                               transparency_of(tiff, page)});
@@ -241,9 +232,9 @@ Result<StillContents> examine_tiff(std::string_view s, const std::string& where)
   const std::size_t first = at;
   std::size_t directories = 0;  // bytes
   for (; at != 0 && seen.insert(at).second; at = tiff.next(at)) {
-    if (!tiff.has_directory(at)) return cut_short(where, "TIFF");
+    if (!tiff.has_directory(at)) return truncated_picture(where, "TIFF");
     directories += 2 + std::size_t{12} * tiff.get16(at);
-    if (directories > s.size()) return broken(where, "TIFF", "its directories overlap");
+    if (directories > s.size()) return damaged_picture(where, "TIFF", "its directories overlap");
     if (tiff.value(at, kSamples, 1) == 2)
       return Error{ErrorKind::bad_input, "the TIFF has grey and a second sample, which isn't read", where,
                    "Convert it to PNG"};
@@ -274,6 +265,15 @@ Result<StillContents> examine_pnms(std::string_view s) {
 }
 
 }  // namespace
+
+Error truncated_picture(const std::string& where, std::string_view kind) {
+  return {ErrorKind::bad_input, "the " + std::string(kind) + " is truncated", where,
+          "Copy or record it again"};
+}
+Error damaged_picture(const std::string& where, std::string_view kind, std::string_view reason) {
+  return {ErrorKind::bad_input, "the " + std::string(kind) + " is damaged: " + std::string(reason), where,
+          "Copy or record it again"};
+}
 
 bool is_pnm(std::string_view content) {
   return content.size() > 2 && content[0] == 'P' && content[1] >= '1' && content[1] <= '6' &&

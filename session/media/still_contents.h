@@ -42,6 +42,10 @@ Result<StillContents> examine_still(std::string_view content, const std::string&
 /// Makes a TIFF begin with another of its pictures, stored without an orientation.
 void select_tiff_page(std::string& content, const StillContents::Picture& page);
 
+/// Errors of a picture of this kind ("PNG").
+Error truncated_picture(const std::string& where, std::string_view kind);
+Error damaged_picture(const std::string& where, std::string_view kind, std::string_view reason);
+
 bool is_pnm(std::string_view content);
 bool is_png(std::string_view content);
 bool is_jpeg(std::string_view content);

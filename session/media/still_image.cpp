@@ -36,15 +36,6 @@ Error not_read(std::string_view s, const std::string& where) {
           where, "Convert it to PNG or JPEG"};
 }
 
-Error truncated(const std::string& where, std::string_view kind) {
-  return {ErrorKind::bad_input, "the " + std::string(kind) + " is truncated", where,
-          "Copy or record it again"};
-}
-Error damaged(const std::string& where, std::string_view kind, std::string_view reason) {
-  return {ErrorKind::bad_input, "the " + std::string(kind) + " is damaged: " + std::string(reason), where,
-          "Copy or record it again"};
-}
-
 /// Binary PGM and PPM. Parsed here because OpenCV reports neither maxval nor truncation.
 Result<Image> decode_binary_pnm(std::string_view content, const std::string& where) {
   PnmHeader header(content);
@@ -52,9 +43,10 @@ Result<Image> decode_binary_pnm(std::string_view content, const std::string& whe
   const auto height = header.number();
   const auto maxval = header.number();
   if (!width || !height || !maxval)
-    return damaged(where, "PNM header", "width, height and maxval are expected");
+    return damaged_picture(where, "PNM header", "width, height and maxval are expected");
   EMBERLOCK_RETURN_IF_ERROR(check_image_size(*width, *height, where));
-  if (*maxval < 1 || *maxval > 65535) return damaged(where, "PNM header", "maxval is outside 1..65535");
+  if (*maxval < 1 || *maxval > 65535)
+    return damaged_picture(where, "PNM header", "maxval is outside 1..65535");
 
   const bool wide = *maxval > 255;
   const bool color = content[1] == '6';
@@ -64,7 +56,8 @@ Result<Image> decode_binary_pnm(std::string_view content, const std::string& whe
   while (layout.white() < *maxval) ++layout.bit_depth;
 
   const std::string_view samples = header.samples();
-  if (samples.size() < layout.row_bytes() * static_cast<std::size_t>(*height)) return truncated(where, "PNM");
+  if (samples.size() < layout.row_bytes() * static_cast<std::size_t>(*height))
+    return truncated_picture(where, "PNM");
   Image image(layout);
   std::memcpy(image.bytes().data(), samples.data(), image.bytes().size());
   if (wide) {  // big-endian in the file
@@ -193,11 +186,11 @@ Result<Image> decode_picture(std::string& file, const StillContents::Picture& pi
     // imdecode doesn't write, but cv::Mat has no view of constant bytes.
     const cv::Mat bytes(1, static_cast<int>(content.size()), CV_8U, const_cast<char*>(content.data()));
     const cv::Mat mat = cv::imdecode(bytes, flags);
-    if (mat.empty()) return damaged(where, "image", "it can't be decoded");
+    if (mat.empty()) return damaged_picture(where, "image", "it can't be decoded");
     EMBERLOCK_ASSIGN_OR_RETURN(const cv::Mat shown, without_transparency(mat, picture, alpha, where));
     return from_mat(shown, where);
   } catch (const cv::Exception& e) {
-    return damaged(where, "image", e.err);
+    return damaged_picture(where, "image", e.err);
   }
 }
 

@@ -7,7 +7,6 @@
 
 #include "recon/kernels/planck.h"
 #include "tests/support/glowing_flame.h"
-#include "tests/support/key_points.h"
 
 namespace emberlock::recon {
 namespace {
@@ -26,29 +25,6 @@ TEST(Dispersion, IsWhatSootOfAConstantIndexIsReadTooHotBy) {
       EXPECT_NEAR(dispersion.at(read), -wien * kelvin * kelvin, 0.5 * wien * kelvin * kelvin);
     }
   }
-}
-
-TEST(Blended, IsTheMeanOfWhatGlows) {
-  Reconstruction done;
-  done.volume.grid = cube_grid(0.1, 8);
-  each_point(done.volume.grid, [&](int i, int j, int k) {
-    const bool glows = i + j + k > 3;
-    for (int c = 0; c < 3; ++c)
-      done.volume.emission.push_back(glows ? static_cast<float>(10 + i + 2 * j + c * k) : 0);
-    done.volume.extinction.push_back(glows ? 5.0F : 0.0F);
-  });
-  const Volume blend = blended(done).volume;
-  each_point(done.volume.grid, [&](int i, int j, int k, std::size_t p) {
-    const bool glows = i + j + k > 3;
-    EXPECT_EQ(blend.extinction[p], done.volume.extinction[p]) << "even, and dark where it was";
-    if (!glows) {
-      EXPECT_EQ(blend.emission[3 * p], 0);
-    }
-    const auto inner = [](int at) { return at > 0 && at < 8; };
-    if (i + j + k > 6 && inner(i) && inner(j) && inner(k)) {
-      EXPECT_NEAR(blend.emission[3 * p + 1], done.volume.emission[3 * p + 1], 1e-4) << "linear";
-    }
-  });
 }
 
 }  // namespace

@@ -143,9 +143,10 @@ TEST_F(EngineThreads, ASessionInSalvageIsShownAndRefusedForAllElseWhileARecordin
                                                  test::small_disk_options());
     ASSERT_TRUE(writer->write(0, test::noise_frame(kLeftLayout, 0)));
   }
-  // Salvage waits for whoever would write this.
-  const auto index = session::index_path(sessions() / "killed", "cam0");
-  std::filesystem::remove(index);
+  // Salvage writes its new index here, and waits until somebody reads it.
+  const auto old_index = session::index_path(sessions() / "killed", "cam0");
+  const auto index = old_index.parent_path() / ("." + old_index.filename().string() + ".salvaged.partial." +
+                                                std::to_string(::getpid()));
   ASSERT_EQ(::mkfifo(index.c_str(), 0600), 0);
   start();
   ASSERT_TRUE(wait_until([&] {
@@ -171,9 +172,8 @@ TEST_F(EngineThreads, ASessionInSalvageIsShownAndRefusedForAllElseWhileARecordin
   ASSERT_TRUE(engine_->record(take()).ok());
   EXPECT_EQ(board_.status()->jobs(0).state(), v1::Job::PAUSED);
   EXPECT_EQ(engine_->stop_recording()->state(), v1::RecordingStatus::COMPLETE);
-  ASSERT_TRUE(wait_until(
-      [&] { return UniqueFd(::open(index.c_str(), O_WRONLY | O_NONBLOCK | O_CLOEXEC)).get() >= 0; }));
-  // It is no index: the operator is told.
+  const UniqueFd reader(::open(index.c_str(), O_RDONLY | O_NONBLOCK | O_CLOEXEC));
+  // What is in a pipe can't be flushed to a disk: the operator reads that salvage failed.
   ASSERT_TRUE(wait_until([&] { return board_.status()->faults_size() == 1; }));
   EXPECT_EQ(board_.status()->faults(0).kind(), v1::Fault::SALVAGE_FAILED);
   EXPECT_EQ(board_.status()->faults(0).subject(), "killed");

@@ -105,7 +105,7 @@ Status EventLog::sync() {
     disk_->behind = false;
   }
   const bool synced = ::fdatasync(fd_.get()) == 0;
-  const Status done = synced ? Status{} : Status(errno_error(path_, "cannot flush"));
+  Status done = synced ? Status{} : Status(errno_error(path_, "cannot flush"));
   const std::scoped_lock lock(disk_->mutex);
   disk_->failure = done;
   if (!done) {

@@ -78,7 +78,7 @@ class ExtinctionChoice {
     report.seconds = took;
     return report;
   }
-  /// After decide(): extinctions that validation hardly tells from its result.
+  /// After decide(): extinctions that explain the pictures nearly as well as its result.
   [[nodiscard]] const std::vector<Extinction>& alternatives() const { return found_.alternatives; }
 
  private:
@@ -283,6 +283,7 @@ Result<EffectChoice> choose_effects(const PreparedScene& scene, const Grid& grid
   choice.effects.light = light.light;
   choice.effects.extinction = light.extinction;
   choice.reports.insert(choice.reports.begin(), {std::move(report), std::move(light.report)});
+  if (light.light.source == Light::Source::none) choice.alternatives = extinction.alternatives();
   known.extinction = choice.effects.extinction;
   choice.effects.motion = motion.fine(known);
   choice.reports.push_back(motion.report());

@@ -20,8 +20,7 @@ struct EstimatedExtinction {
   /// Validation errors with it and with none, grey levels; 0 where there was no time.
   double error = 0;
   double error_of_none = 0;
-  /// The thinnest and the thickest candidate that validation hardly tells from it (by less than a twentieth
-  /// of its error), if they are others.
+  /// The thinnest and the thickest candidate whose validation errors exceed its by less than a twentieth.
   std::vector<Extinction> alternatives = {};
 };
 
@@ -29,7 +28,8 @@ struct EstimatedExtinction {
 /// from a wrong scale doesn't recover, so this is a global search by cross-validation (Stone 1974): solves on
 /// the hull of `probing` (of carve_probe()), each by as many steps from zero, judged on pixels and on views
 /// that are left out of the fit. The candidates are no extinction, unless `forced`, and for each distribution
-/// optical depths that double along the mean ray.
+/// optical depths that double along the mean ray; uniform and soot-like ones only around the best mixture of
+/// both, if that lowers the error.
 ///
 /// With a budget, the search ends when it has used a third of it.
 EstimatedExtinction find_extinction(const SolverSetup& probing, bool forced, const Elapsed& elapsed = {});

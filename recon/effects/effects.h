@@ -178,6 +178,9 @@ struct EffectReport {
 struct EffectChoice {
   Effects effects;
   std::vector<EffectReport> reports;  ///< one for each effect of the table
+  /// Other extinctions, or none, that explain the pictures nearly as well: what they change is an error of
+  /// the result.
+  std::vector<Extinction> alternatives = {};
 };
 
 }  // namespace emberlock::recon

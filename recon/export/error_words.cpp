@@ -23,8 +23,12 @@ std::vector<std::string> error_words(const ErrorSummary& e) {
   if (e.extinction > 0) of_extinction = fmt::format(", and the extinction to +-{:.2g} 1/m", e.extinction);
   std::vector<std::string> words = {fmt::format(
       "the light is known to +-{:.2g} % (one standard error, RMS where there is light){}: found by "
-      "{} solves without some of the views, in {:.1f} s",
-      percent, of_extinction, e.solves, e.views_time.value())};
+      "{} solves without some of the views{}, in {:.1f} s",
+      percent, of_extinction, e.solves,
+      e.models > 0
+          ? fmt::format(" and {} with an extinction that explains the pictures nearly as well", e.models)
+          : "",
+      e.views_time.value())};
   if (!e.why_no_noise.empty()) words.push_back(e.why_no_noise);
   if (!e.noise) return words;
   const double share = e.emission > 0 ? e.noise->emission / e.emission : 0;

@@ -97,8 +97,9 @@ ordered_json lines_json(const TemperatureSummary& t) {
 ordered_json errors_json(const std::optional<ErrorSummary>& errors) {
   if (!errors) return {};
   const ErrorSummary& e = *errors;
-  ordered_json json = {{"light", e.light},   {"emission", e.emission},          {"extinction", e.extinction},
-                       {"solves", e.solves}, {"seconds", e.views_time.value()}, {"noise", nullptr}};
+  ordered_json json = {{"light", e.light},   {"emission", e.emission}, {"extinction", e.extinction},
+                       {"solves", e.solves}, {"models", e.models},     {"seconds", e.views_time.value()},
+                       {"noise", nullptr}};
   if (e.noise)
     json["noise"] = {{"pixel", e.noise->pixel},
                      {"emission", e.noise->emission},

@@ -111,13 +111,13 @@ struct Report {
 /// scaled so that the last is that of all), `views` [{index, name, role, rmse}], `deviations` (of
 /// the paper's solver from the paper), `voxel_choice` {rule, voxels, by_the_paper, calibration_seconds,
 /// expected_seconds, options [{voxels, seconds, error}], words}, `plan` (null without a budget or target),
-/// `errors` (null unless asked for: {light, emission, extinction, solves, seconds, noise: null or {pixel,
-/// emission, extinction, probes, seconds}}), `temperature` (null unless asked for: {emitter, response,
-/// absolute, by_absorption, opacity, mean, low, high, sigma, chi_square, emitter_told, if_other, dispersion,
-/// emitting, told, colder, hotter, unclear, other, saturated, mixed, line_alone, alike, lines {automatic,
-/// found [{name, share, seen}], alike [names]}, joint {iterations, cost_before, cost_after, last_drop, moved,
-/// left_out}, solves, seconds {errors, reading, joint}}) and what describes the run. Held-out errors are null
-/// when nothing is held out.
+/// `errors` (null unless asked for: {light, emission, extinction, solves, models, seconds, noise: null or
+/// {pixel, emission, extinction, probes, seconds}}), `temperature` (null unless asked for: {emitter,
+/// response, absolute, by_absorption, opacity, mean, low, high, sigma, chi_square, emitter_told, if_other,
+/// dispersion, emitting, told, colder, hotter, unclear, other, saturated, mixed, line_alone, alike, lines
+/// {automatic, found [{name, share, seen}], alike [names]}, joint {iterations, cost_before, cost_after,
+/// last_drop, moved, left_out}, solves, seconds {errors, reading, joint}}) and what describes the run.
+/// Held-out errors are null when nothing is held out.
 std::string to_json(const Report& report);
 
 }  // namespace emberlock::recon

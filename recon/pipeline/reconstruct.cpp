@@ -90,6 +90,8 @@ Status measure(const Task& task, const ReconstructOptions& options, const Progre
   if (!options.errors && !options.temperature) return {};
   EMBERLOCK_ASSIGN_OR_RETURN(outcome.errors, errors_by_views(task.scene(), outcome.reconstruction,
                                                              options.solve, task.elapsed, progress));
+  EMBERLOCK_RETURN_IF_ERROR(add_errors_by_models(task.scene(), outcome.reconstruction, outcome.alternatives,
+                                                 options.solve, *outcome.errors, task.elapsed, progress));
   if (options.errors) {
     const bool lit = outcome.reconstruction.effects.light.source != Light::Source::none;
     if (options.solve.solver == Solver::standard && !lit) {

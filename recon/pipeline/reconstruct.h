@@ -76,8 +76,9 @@ struct Outcome {
   FoundPointing pointing;              ///< how cameras were put right
   std::vector<RadianceImage> renders;  ///< the volume as each view's camera sees it, in the scene's order
   Report report;                       ///< its `input` and `up` are the caller's to fill
-  std::optional<VolumeErrors> errors = {};  ///< where options ask for errors or temperature
-  std::optional<NoiseErrors> noise = {};    ///< where options ask for errors
+  std::vector<Extinction> alternatives = {};  ///< to that of the volume (EffectChoice)
+  std::optional<VolumeErrors> errors = {};    ///< where options ask for errors or temperature
+  std::optional<NoiseErrors> noise = {};      ///< where options ask for errors
   std::optional<TemperatureField> temperature = {};
 };
 

@@ -277,6 +277,7 @@ Result<Outcome> run_once(const Task& task, const ReconstructOptions& options, co
   Outcome outcome = finish(task, decided, solve_options, std::move(done), progress);
   outcome.report.effects_time = effects_time;
   outcome.report.effects = std::move(choice.reports);
+  outcome.alternatives = std::move(choice.alternatives);
   return outcome;
 }
 

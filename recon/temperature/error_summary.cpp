@@ -21,6 +21,7 @@ ErrorSummary error_summary(const Volume& volume, const VolumeErrors& errors,
                            const std::optional<NoiseErrors>& noise) {
   ErrorSummary out;
   out.solves = errors.solves;
+  out.models = errors.models;
   out.views_time = errors.time;
   if (noise) out.noise = {noise->noise, 0, 0, noise->probes, noise->time};
   const auto least = static_cast<float>(kLightThatCounts) *

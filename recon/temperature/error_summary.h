@@ -20,6 +20,7 @@ struct ErrorSummary {
   double emission = 0;    ///< one standard error, levels/m
   double extinction = 0;  ///< the same, 1/m; 0 where none was reconstructed
   int solves = 0;         ///< without some of the views
+  int models = 0;         ///< with another extinction
   Seconds views_time{0};
   struct Noise {
     double pixel = 0;       ///< grey levels

@@ -28,9 +28,10 @@ double pixel_noise(const RadianceImage& image, const FlameMask& lit);
 /// (gauss_newton.h) and s the noise of a pixel: probes draw noise in pixels and ties, and H^-1 of what it
 /// pulls has that covariance (Papandreou and Yuille 2010). Their squares are pooled over each point's 26
 /// neighbours. It holds what noise does and what the ties leave open: one to three times what repeated noise
-/// does to the emission, from half of it on where the extinction was found too, whose solve ends before it
-/// has settled. What is 0 or at its bound stays. On the CPU; the same bits for every number of threads.
-/// Errors: of kind not_converged where it isn't finite; refused if `options.stop` asks to end.
+/// does to the emission, from a third of it on where the extinction was found too, whose solve ends before it
+/// has settled and which starts from the light that the noisy pictures show. What is 0 or at its bound stays.
+/// On the CPU; the same bits for every number of threads. Errors: of kind not_converged where it isn't
+/// finite; refused if `options.stop` asks to end.
 Result<NoiseErrors> errors_by_noise(const Scene& scene, const Reconstruction& done,
                                     const SolveOptions& options, const Elapsed& elapsed = {},
                                     const Progress& progress = {});

@@ -58,7 +58,7 @@ VolumeErrors variances(Deviations sums, const Grid& grid, int groups, Pool& pool
   take_neighbour_mean(sums.products, 6, grid, pool);
   take_neighbour_mean(sums.squares, sums.squares.empty() ? 0 : 1, grid, pool);
   for (float& v : sums.squares) v = std::sqrt(v);
-  return {std::move(sums.products), std::move(sums.squares), groups, Seconds(0)};
+  return {.emission = std::move(sums.products), .extinction = std::move(sums.squares), .solves = groups};
 }
 
 int left_out_groups(const Scene& scene) {
@@ -132,6 +132,33 @@ Result<VolumeErrors> errors_by_views(const Scene& scene, const Reconstruction& d
   VolumeErrors errors = variances(std::move(sums), done.volume.grid, groups, pool);
   if (elapsed) errors.time = elapsed() - start;
   return errors;
+}
+
+Status add_errors_by_models(const Scene& scene, const Reconstruction& done,
+                            const std::vector<Extinction>& alternatives, const SolveOptions& options,
+                            VolumeErrors& errors, const Elapsed& elapsed, const Progress& progress) {
+  const Seconds start = elapsed ? elapsed() : Seconds(0);
+  const SolveOptions again = to_solve_again(done, options);
+  Pool pool(options.compute.threads);
+  Deviations sums(done.volume.grid.size(), !errors.extinction.empty());
+  for (const Extinction& alternative : alternatives) {
+    tell(progress, 0.5, "errors: with another extinction");
+    Effects effects = done.effects;
+    effects.extinction = alternative;
+    const auto other = solve(scene, done.volume.grid, effects, again, elapsed);
+    if (is_stopped(options))
+      return Error{ErrorKind::refused, "ended early, as asked, before its errors were known", "--errors"};
+    if (!other.ok()) continue;
+    sums.add(done.volume, other->volume, pool);
+    ++errors.models;
+  }
+  if (errors.models == 0) return {};
+  const auto models = static_cast<float>(errors.models);
+  for (std::size_t i = 0; i < errors.emission.size(); ++i) errors.emission[i] += sums.products[i] / models;
+  for (std::size_t p = 0; p < errors.extinction.size(); ++p)
+    errors.extinction[p] = std::hypot(errors.extinction[p], std::sqrt(sums.squares[p] / models));
+  if (elapsed) errors.time += elapsed() - start;
+  return {};
 }
 
 }  // namespace emberlock::recon

@@ -17,6 +17,7 @@ struct VolumeErrors {
   std::vector<float> emission;  ///< covariance of R, G and B: rr, rg, rb, gg, gb, bb; 6 * size, (levels/m)^2
   std::vector<float> extinction;  ///< one sigma, 1/m; empty where none was reconstructed
   int solves = 0;                 ///< with so many groups of views left out, one after the other
+  int models = 0;                 ///< other extinctions whose deviations are part of it
   Seconds time{0};
 
   [[nodiscard]] Eigen::Matrix3d covariance(std::size_t point) const;
@@ -45,5 +46,12 @@ SolveOptions to_solve_again(const Reconstruction& done, const SolveOptions& opti
 Result<VolumeErrors> errors_by_views(const Scene& scene, const Reconstruction& done,
                                      const SolveOptions& options, const Elapsed& elapsed = {},
                                      const Progress& progress = {});
+
+/// Adds what the choice of the extinction leaves open: solves again under each of `alternatives`, which
+/// explain the pictures as well (EffectChoice), and adds the mean square of their deviations. One that can't
+/// be solved explains nothing and is passed over. Errors: of kind refused if `options.stop` asks to end.
+Status add_errors_by_models(const Scene& scene, const Reconstruction& done,
+                            const std::vector<Extinction>& alternatives, const SolveOptions& options,
+                            VolumeErrors& errors, const Elapsed& elapsed = {}, const Progress& progress = {});
 
 }  // namespace emberlock::recon

@@ -33,7 +33,7 @@ Status ClipReader::seek(std::int64_t place) {
     EMBERLOCK_RETURN_IF_ERROR(open(index));
     ahead = place - part.first;
   }
-  const Status moved = part.scan.counted || ahead == 0
+  Status moved = part.scan.counted || ahead == 0
                            ? file_->skip(ahead)
                            : file_->seek(part.scan.ticks[static_cast<std::size_t>(ahead)]);
   if (!moved.ok()) file_.reset();  // it isn't at `place_`

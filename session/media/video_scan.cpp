@@ -141,6 +141,7 @@ void drop_misplaced(std::vector<std::optional<std::int64_t>>& stamps) {
                     static_cast<double>(known[k] - known[k - 1]));
   const double pace = middle(paces);
   std::vector<double> begins;  // the first frame's time by each stamp
+  begins.reserve(known.size());
   for (const std::size_t i : known)
     begins.push_back(static_cast<double>(*stamps[i]) - pace * static_cast<double>(i));
   for (std::size_t k = 0; k < known.size(); ++k) {

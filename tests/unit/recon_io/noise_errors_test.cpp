@@ -135,7 +135,7 @@ TEST(NoiseErrorsTestSlow, AreAboutWhatRepeatedNoiseDoes) {
     for (const double noise : {0.25, 1.0, 4.0}) {
       const bool found = model == Extinction::Model::field;
       const Ratios ratios = over_repeated(solved(noise, model), noise);
-      EXPECT_GT(ratios.by_noise, found ? 0.5 : 0.9) << noise;
+      EXPECT_GT(ratios.by_noise, found ? 0.3 : 0.9) << noise;
       EXPECT_LT(ratios.by_noise, 3) << noise;
       std::printf("noise %g, extinction %s: errors over repeated noise's: by noise %.1f, by views %.1f\n",
                   noise, found ? "found" : "none", ratios.by_noise, ratios.by_views);

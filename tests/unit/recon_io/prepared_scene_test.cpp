@@ -48,20 +48,23 @@ int pictures_made(const Scene& scene, const std::optional<EffectRequest>& effect
   });
 }
 
+/// Each view is rendered with the volume and without any light.
+constexpr int kRenders = 2 * kViewsOfABall;
+
 TEST(PreparedSceneTestSlow, AReconstructionOfLinearPicturesMakesNoneButItsRenders) {
-  EXPECT_EQ(pictures_made(scene_of_a_ball(), EffectRequest{Effects{}}), kViewsOfABall);
-  EXPECT_EQ(pictures_made(scene_of_a_ball(), {}), kViewsOfABall) << "nor does the search for effects";
+  EXPECT_EQ(pictures_made(scene_of_a_ball(), EffectRequest{Effects{}}), kRenders);
+  EXPECT_EQ(pictures_made(scene_of_a_ball(), {}), kRenders) << "nor does the search for effects";
 }
 
 TEST(PreparedSceneTestSlow, AReconstructionMakesPicturesLinearOnce) {
-  EXPECT_EQ(pictures_made(scene_of_a_ball(), EffectRequest{a_gamma()}), 2 * kViewsOfABall);
+  EXPECT_EQ(pictures_made(scene_of_a_ball(), EffectRequest{a_gamma()}), kViewsOfABall + kRenders);
 }
 
 TEST(PreparedSceneTestSlow, ACameraThatIsPutRightCostsNoPictures) {
   Scene scene = scene_of_a_ball();
   scene.views[2].camera.intrinsics.cy += 30;
   std::vector<std::string> warnings;
-  EXPECT_EQ(pictures_made(scene, EffectRequest{Effects{}}, &warnings), kViewsOfABall);
+  EXPECT_EQ(pictures_made(scene, EffectRequest{Effects{}}, &warnings), kRenders);
   EXPECT_THAT(warnings, testing::Contains(testing::HasSubstr("was put right")));
 }
 

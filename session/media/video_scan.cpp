@@ -3,6 +3,7 @@
 
 extern "C" {
 #include <libavutil/parseutils.h>
+#include <libavutil/pixdesc.h>
 }
 
 #include <algorithm>
@@ -223,6 +224,11 @@ void judge_evenness(VideoScan& scan) {
                   1e3 * interval * scan.tick.value());
 }
 
+bool format_has_alpha(AVPixelFormat format) {
+  const AVPixFmtDescriptor* d = av_pix_fmt_desc_get(format);
+  return d != nullptr && (d->flags & AV_PIX_FMT_FLAG_ALPHA) != 0;
+}
+
 }  // namespace
 
 bool VideoScan::truncated() const { return frames() < promised; }
@@ -274,6 +280,10 @@ Result<VideoScan> scan_video(const std::filesystem::path& path) {
   scan.display = display_of(*input.format->streams[input.stream]);
   scan.sound = av_find_best_stream(input.format.get(), AVMEDIA_TYPE_AUDIO, -1, -1, nullptr, 0) >= 0;
   const Packets packets = read_packets(input);
+  if (format_has_alpha(input.decoder->pix_fmt)) {
+    EMBERLOCK_ASSIGN_OR_RETURN(const auto film, FrameFile::open(path));
+    EMBERLOCK_RETURN_IF_ERROR(film->next());
+  }
   if (packets.shown.empty())
     return Error{ErrorKind::bad_input, "the video holds no frames", path.string(), "Copy or record it again"};
   if (!take_packet_stamps(packets, *file, scan))

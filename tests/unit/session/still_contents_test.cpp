@@ -12,6 +12,7 @@
 #include <opencv2/core.hpp>
 #include <opencv2/imgcodecs.hpp>
 
+#include "session/media/clip.h"
 #include "session/media/frame_file.h"
 #include "session/media/video_scan.h"
 #include "tests/support/recording.h"
@@ -247,6 +248,24 @@ TEST(StillContents, AnOrientationIsReportedAndNotApplied) {
           EXPECT_THAT(unapplied[0], HasSubstr("EXIF orientation " + std::to_string(orientation)));
         }
       }
+    }
+  }
+}
+
+TEST(StillContents, APictureTurnedOtherwiseThanTheCamerasFirstIsRefused) {
+  const TempFolder temp;
+  const std::string jpeg = encoded(pictures(1)[0], ".jpg");
+  for (const auto& [first, second] : {std::pair{1, 6}, {6, 1}, {3, 6}, {3, 3}, {1, 1}}) {
+    put_bytes(temp / "0.jpg", with_exif(jpeg, first, true));
+    put_bytes(temp / "1.jpg", with_exif(jpeg, second, true));
+    const VideoScan scan = *scan_video(temp / "0.jpg");
+    ClipReader reader({{temp / "0.jpg", scan, 0}, {temp / "1.jpg", scan, 1}}, Colours::keep);
+    ASSERT_TRUE(reader.next().ok());
+    const Result<Image> next = reader.next();
+    EXPECT_EQ(next.ok(), first == second) << first << second;
+    if (!next.ok()) {
+      EXPECT_THAT(next.error().message(), HasSubstr("1.jpg"));
+      EXPECT_THAT(next.error().message(), HasSubstr("EXIF orientation"));
     }
   }
 }

@@ -127,6 +127,7 @@ ProbedFilm of_pictures(const session::CameraFiles& files, const FilmOptions& opt
     const bool scan_it = stacks && file != files.files.front();
     Result<session::VideoScan> scan = scan_it ? session::scan_video(file) : first;
     if (!scan.ok()) return {{}, FilmProblem{scan.error(), {}}};
+    if (scan->unapplied != first->unapplied) return {{}, FilmProblem{session::orientation_changed(file), {}}};
     film.parts.push_back({file, std::move(scan).value(), film.frames});
     film.frames += film.parts.back().scan.frames();
   }

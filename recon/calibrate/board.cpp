@@ -129,15 +129,12 @@ std::vector<BoardCorner> find_chessboard(const cv::Mat& grey, const Board& board
 
 std::vector<BoardCorner> find_charuco(const cv::Mat& grey, const Board& board) {
   const auto aruco = aruco_board(board);
-  const auto parameters = cv::aruco::DetectorParameters::create();
-  std::vector<std::vector<cv::Point2f>> markers;
-  std::vector<std::vector<cv::Point2f>> rejected;
-  std::vector<int> marker_ids;
-  cv::aruco::detectMarkers(grey, aruco->dictionary, markers, marker_ids, parameters, rejected);
-  if (marker_ids.empty()) return {};
+  const double margin = 0.5 * (board.square.value() / board.marker.value() - 1);
+  const FoundQuads markers = find_quads(grey, aruco->dictionary, margin);
+  if (markers.ids.empty()) return {};
   std::vector<cv::Point2f> corners;
   std::vector<int> ids;
-  cv::aruco::interpolateCornersCharuco(markers, marker_ids, grey, aruco, corners, ids);
+  cv::aruco::interpolateCornersCharuco(markers.corners, markers.ids, grey, aruco, corners, ids);
   // OpenCV's corners are half a pixel too far to the lower right. The marker's edge limits the window.
   refine(corners, ids, board, grey, 0.5 * (1 - board.marker.value() / board.square.value()));
   std::vector<BoardCorner> result;

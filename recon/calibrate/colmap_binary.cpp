@@ -1,12 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
-#include <array>
 #include <bit>
 #include <cstring>
-#include <optional>
 
 #include <fmt/format.h>
 
+#include "recon/calibrate/calibration_fields.h"
 #include "recon/calibrate/colmap_model.h"
 #include "recon/calibrate/rig_formats.h"
 
@@ -17,23 +16,6 @@ namespace {
 
 static_assert(std::endian::native == std::endian::little);
 
-struct NumberedLens {
-  const char* name;
-  std::size_t parameters;
-};
-/// By COLMAP's number of the model.
-constexpr std::array<NumberedLens, 12> kNumberedLenses = {{{"SIMPLE_PINHOLE", 3},
-                                                           {"PINHOLE", 4},
-                                                           {"SIMPLE_RADIAL", 4},
-                                                           {"RADIAL", 5},
-                                                           {"OPENCV", 8},
-                                                           {"OPENCV_FISHEYE", 8},
-                                                           {"FULL_OPENCV", 12},
-                                                           {"FOV", 5},
-                                                           {"SIMPLE_RADIAL_FISHEYE", 4},
-                                                           {"RADIAL_FISHEYE", 5},
-                                                           {"THIN_PRISM_FISHEYE", 12},
-                                                           {"RAD_TAN_THIN_PRISM_FISHEYE", 16}}};
 constexpr std::size_t kBytesOfPoint = 24;  // x, y and the number of the 3D point
 
 /// Reads a file's bytes from the front. Once they end, everything is 0 and ended() is true.
@@ -84,9 +66,9 @@ Result<ColmapCamera> next_camera(ByteReader& reader, const std::string& where) {
   const auto number = reader.next<std::int32_t>();
   for (int side = 0; side < 2; ++side)
     camera.numbers.push_back(static_cast<double>(reader.next<std::uint64_t>()));
-  if (number < 0 || static_cast<std::size_t>(number) >= kNumberedLenses.size())
+  if (number < 0 || static_cast<std::size_t>(number) >= kColmapLenses.size())
     return bad_binary(where, fmt::format("the camera model {} isn't known", number));
-  const NumberedLens& lens = kNumberedLenses[static_cast<std::size_t>(number)];
+  const ColmapLens& lens = kColmapLenses[static_cast<std::size_t>(number)];
   camera.model = lens.name;
   for (std::size_t i = 0; i < lens.parameters; ++i) camera.numbers.push_back(reader.next<double>());
   return camera;

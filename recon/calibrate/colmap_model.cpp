@@ -9,20 +9,10 @@
 #include <Eigen/Geometry>
 #include <fmt/format.h>
 
+#include "recon/calibrate/calibration_fields.h"
+
 namespace emberlock::recon {
 namespace {
-
-struct ColmapLens {
-  const char* name;
-  std::size_t parameters;
-  bool one_focal;
-};
-constexpr std::array<ColmapLens, 6> kColmapLenses = {{{"SIMPLE_PINHOLE", 3, true},
-                                                      {"PINHOLE", 4, false},
-                                                      {"SIMPLE_RADIAL", 4, true},
-                                                      {"RADIAL", 5, true},
-                                                      {"OPENCV", 8, false},
-                                                      {"FULL_OPENCV", 12, false}}};
 
 Error bad_model(std::string where, std::string what, std::string remedy) {
   return {ErrorKind::bad_input, std::move(what), std::move(where), std::move(remedy)};
@@ -31,7 +21,7 @@ Error bad_model(std::string where, std::string what, std::string remedy) {
 Result<Intrinsics> lens_of_colmap(const ColmapCamera& camera) {
   const auto* known = std::find_if(kColmapLenses.begin(), kColmapLenses.end(),
                                    [&](const ColmapLens& lens) { return camera.model == lens.name; });
-  if (known == kColmapLenses.end()) {
+  if (known == kColmapLenses.end() || known->use != FieldUse::used) {
     const bool fisheye = camera.model.find("FISHEYE") != std::string::npos;
     return bad_model(camera.where,
                      fmt::format("the camera model {} isn't modelled{}", camera.model,

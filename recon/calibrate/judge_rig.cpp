@@ -115,6 +115,25 @@ std::vector<std::size_t> largest_agreeing(const std::vector<SeenBoards>& seen, c
   return best;
 }
 
+/// How many of a camera's placed views stand at instants that other cameras see too. The others fit whatever
+/// the camera's pose is.
+std::ptrdiff_t shared_views(const std::vector<PlacedSighting>& placed, std::size_t camera) {
+  std::map<std::size_t, int> cameras;  // by instant
+  for (const PlacedSighting& view : placed) ++cameras[view.instant];
+  return std::count_if(placed.begin(), placed.end(), [&](const PlacedSighting& view) {
+    return view.camera == camera && cameras[view.instant] > 1;
+  });
+}
+
+/// How many of a camera's views the solution uses together with another camera's view of the same board.
+std::ptrdiff_t views_used_together(const Bundle& bundle, std::size_t at) {
+  std::vector<int> used(bundle.boards.size());
+  for (const BundleView& view : bundle.views) used[view.board] += view.used() > 0 ? 1 : 0;
+  return std::count_if(bundle.views.begin(), bundle.views.end(), [&](const BundleView& view) {
+    return view.camera == at && view.used() > 0 && used[view.board] > 1;
+  });
+}
+
 /// Why a camera isn't described, in a few words; empty if it is.
 std::string fault_of(const RigCalibration& result, const std::vector<PlacedSighting>& placed,
                      std::size_t camera) {
@@ -122,13 +141,10 @@ std::string fault_of(const RigCalibration& result, const std::vector<PlacedSight
   const auto member = std::find(result.bundle_camera.begin(), result.bundle_camera.end(), camera);
   if (member == result.bundle_camera.end()) return "none of its views fits the other cameras'";
   const auto at = static_cast<std::size_t>(member - result.bundle_camera.begin());
-  const auto views = std::count_if(placed.begin(), placed.end(),
-                                   [&](const PlacedSighting& view) { return view.camera == camera; });
-  const auto used =
-      std::count_if(result.bundle.views.begin(), result.bundle.views.end(),
-                    [&](const BundleView& view) { return view.camera == at && view.used() > 0; });
+  const auto views = shared_views(placed, camera);
+  const auto used = views_used_together(result.bundle, at);
   if (static_cast<double>(used) < kFewestUsed * static_cast<double>(views))
-    return fmt::format("only {} of its {} views fit the other cameras'", used, views);
+    return fmt::format("only {} of the {} views that it shares fit the other cameras'", used, views);
   const Eigen::VectorXd sigma =
       result.covariance.diagonal().segment<kCameraUnknowns>(static_cast<Eigen::Index>(at) * kCameraUnknowns);
   return lens_misfit(result.bundle.cameras[at], sigma.cwiseSqrt());
@@ -169,9 +185,14 @@ std::vector<Misfit> find_misfits(const BoardSightings& sightings, const std::vec
   for (const std::size_t camera : group) seen.push_back(boards_of(sightings, lenses, placed, camera));
   const std::vector<std::size_t> sound = largest_agreeing(seen, sightings.board);
   std::vector<Misfit> misfits;
-  for (std::size_t at = 0; at < group.size(); ++at)
-    if (std::find(sound.begin(), sound.end(), at) == sound.end())
+  for (std::size_t at = 0; at < group.size(); ++at) {
+    if (std::find(sound.begin(), sound.end(), at) != sound.end()) continue;
+    const bool disagrees = std::any_of(sound.begin(), sound.end(), [&](std::size_t other) {
+      return disagreement(sightings.board, seen[other], seen[at]).has_value();
+    });
+    if (disagrees || !faults[at].empty())
       misfits.push_back(misfit_of(sightings, seen, sound, group, at, faults[at]));
+  }
   if (!misfits.empty()) return misfits;
   const auto noise = [&](std::size_t at) {  // infinite if it isn't in the solution
     const auto member = std::find(result.bundle_camera.begin(), result.bundle_camera.end(), group[at]);

@@ -17,9 +17,9 @@ struct Misfit {
 };
 
 /// The cameras to leave out of a solved group: none if every camera's lens is as lens_misfit() demands and
-/// most of its `placed` views are used. Otherwise those that agree with few others at the instants that they
-/// share, else the one that fits worst. Of two cameras that disagree the second is named. `placed` holds each
-/// view's pose from its camera's own lens.
+/// most of the `placed` views that it shares with others are used with theirs. Otherwise those that agree
+/// with few others at the instants that they share, else the one that fits worst. Of two cameras that
+/// disagree the second is named. `placed` holds each view's pose from its camera's own lens.
 std::vector<Misfit> find_misfits(const BoardSightings& sightings, const std::vector<Intrinsics>& lenses,
                                  const std::vector<PlacedSighting>& placed, const RigCalibration& result);
 

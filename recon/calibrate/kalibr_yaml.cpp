@@ -1,12 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
 #include <array>
 #include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <yaml-cpp/yaml.h>
 
+#include "recon/calibrate/calibration_fields.h"
 #include "recon/calibrate/chain_poses.h"
 #include "recon/calibrate/pose.h"
 #include "recon/calibrate/rig_formats.h"
@@ -56,6 +60,21 @@ Result<Intrinsics> kalibr_lens(const YAML::Node& camera, const std::string& wher
                     {k[0], k[1], k[2], k[3], 0}};
 }
 
+/// Refuses a rolling shutter, and gathers the keys that aren't known, each once.
+Status check_kalibr_keys(const YAML::Node& camera, const std::string& where, std::set<std::string>& unknown) {
+  for (const auto& entry : camera) {
+    const auto key = entry.first.as<std::string>();
+    const auto* known = std::find_if(kKalibrFields.begin(), kKalibrFields.end(),
+                                     [&](const KalibrField& field) { return key == field.key; });
+    if (known == kKalibrFields.end()) unknown.insert(key);
+    if (known == kKalibrFields.end() || known->use != FieldUse::refused || entry.second.as<double>() == 0)
+      continue;
+    return bad_kalibr(where + "." + key, "a rolling shutter isn't modelled",
+                      "Calibrate with a global shutter, or with pictures of boards that stand still");
+  }
+  return {};
+}
+
 /// The pose of a camera in the one before it.
 Result<Rigid3> kalibr_step(const YAML::Node& camera, const std::string& where) {
   const YAML::Node rows = camera["T_cn_cnm1"];
@@ -76,13 +95,15 @@ Result<Rigid3> kalibr_step(const YAML::Node& camera, const std::string& where) {
   return step;
 }
 
-Result<v1::Rig> rig_of_kalibr(const YAML::Node& file, const std::string& where) {
+Result<v1::Rig> rig_of_kalibr(const YAML::Node& file, const std::string& where, ImportNotes* notes) {
   v1::Rig rig = empty_rig();
+  std::set<std::string> unknown;
   CameraModel camera;
   for (std::size_t n = 0;; ++n) {
     const std::string id = "cam" + std::to_string(n);
     const YAML::Node node = file[id];
     if (!node || !node.IsMap()) break;
+    EMBERLOCK_RETURN_IF_ERROR(check_kalibr_keys(node, where + ": " + id, unknown));
     EMBERLOCK_ASSIGN_OR_RETURN(camera.intrinsics, kalibr_lens(node, where + ": " + id));
     if (n > 0) {
       EMBERLOCK_ASSIGN_OR_RETURN(const Rigid3 step, kalibr_step(node, where + ": " + id));
@@ -91,6 +112,8 @@ Result<v1::Rig> rig_of_kalibr(const YAML::Node& file, const std::string& where) 
     *rig.add_cameras() = rig_camera_of(id, camera);
   }
   EMBERLOCK_RETURN_IF_ERROR(session::check_rig(rig, where));
+  if (notes != nullptr && !unknown.empty())
+    notes->push_back(fmt::format("{}: these keys aren't used: {}", where, fmt::join(unknown, ", ")));
   return rig;
 }
 
@@ -100,9 +123,9 @@ bool is_kalibr(std::string_view text) {
   return text.find("cam0:") != std::string_view::npos && text.find("camera_model") != std::string_view::npos;
 }
 
-Result<v1::Rig> parse_kalibr(std::string_view text, const std::string& where) {
+Result<v1::Rig> parse_kalibr(std::string_view text, const std::string& where, ImportNotes* notes) {
   try {
-    return rig_of_kalibr(YAML::Load(std::string(text)), where);
+    return rig_of_kalibr(YAML::Load(std::string(text)), where, notes);
   } catch (const YAML::Exception& e) {
     return bad_kalibr(fmt::format("{}, line {}", where, e.mark.line + 1), "no camchain of Kalibr's: " + e.msg,
                       "Name the camchain that Kalibr wrote");

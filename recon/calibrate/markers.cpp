@@ -257,6 +257,35 @@ cv::Mat grey_of(const ImageView& picture) {
   return result;
 }
 
+FoundQuads find_quads(const cv::Mat& grey, const cv::Ptr<cv::aruco::Dictionary>& dictionary, double margin) {
+  const auto parameters = cv::aruco::DetectorParameters::create();
+  // OpenCV drops one of two outlines whose corners are nearer than this share of the perimeter. Those of a
+  // border and of the margin around it are 1.4 margins apart.
+  parameters->minMarkerDistanceRate = std::min(parameters->minMarkerDistanceRate, 0.5 * M_SQRT2 * margin / 4);
+  FoundQuads all;
+  cv::aruco::detectMarkers(grey, dictionary, all.corners, all.ids, parameters);
+  // So a marker may be found twice, by outlines of several thresholds. The longest is the one that OpenCV
+  // keeps.
+  FoundQuads found;
+  for (std::size_t m = 0; m < all.ids.size(); ++m) {
+    const double length = cv::arcLength(all.corners[m], true);
+    const auto middle = [](const auto& q) { return 0.25F * (q[0] + q[1] + q[2] + q[3]); };
+    std::size_t same = 0;
+    while (same < found.ids.size() &&
+           (found.ids[same] != all.ids[m] ||
+            cv::norm(middle(found.corners[same]) - middle(all.corners[m])) > length / 8)) {
+      ++same;
+    }
+    if (same == found.ids.size()) {
+      found.ids.push_back(all.ids[m]);
+      found.corners.push_back(all.corners[m]);
+    } else if (length > cv::arcLength(found.corners[same], true)) {
+      found.corners[same] = all.corners[m];
+    }
+  }
+  return found;
+}
+
 std::vector<SeenMarker> find_markers(const ImageView& picture, const std::string& dictionary,
                                      const Intrinsics& lens, const std::array<float, 256>* light,
                                      MarkerInk ink) {
@@ -270,18 +299,17 @@ std::vector<SeenMarker> find_markers(const ImageView& picture, const std::string
     negative = negative_light(light);
     light = &negative;
   }
-  std::vector<std::vector<cv::Point2f>> quads;
-  std::vector<int> ids;
-  cv::aruco::detectMarkers(grey, known, quads, ids, cv::aruco::DetectorParameters::create());
+  const int cells = known->markerSize + 2;
+  const FoundQuads quads = find_quads(grey, known, 1.0 / cells);
   const Brightness brightness(grey, light);
   const Undistorted undistorted(lens);
   std::vector<SeenMarker> markers;
-  for (std::size_t m = 0; m < ids.size(); ++m) {
-    SeenMarker marker{ids[m], {}};
+  for (std::size_t m = 0; m < quads.ids.size(); ++m) {
+    SeenMarker marker{quads.ids[m], {}};
     for (std::size_t c = 0; c < 4; ++c)
-      marker.corners[c] = {static_cast<double>(quads[m][c].x) + 0.5,
-                           static_cast<double>(quads[m][c].y) + 0.5};
-    if (meet_sides(brightness, undistorted, known->markerSize + 2, marker)) markers.push_back(marker);
+      marker.corners[c] = {static_cast<double>(quads.corners[m][c].x) + 0.5,
+                           static_cast<double>(quads.corners[m][c].y) + 0.5};
+    if (meet_sides(brightness, undistorted, cells, marker)) markers.push_back(marker);
   }
   return markers;
 }

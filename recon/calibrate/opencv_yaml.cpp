@@ -16,6 +16,7 @@
 #include <pugixml.hpp>
 #include <yaml-cpp/yaml.h>
 
+#include "recon/calibrate/calibration_fields.h"
 #include "recon/calibrate/pose.h"
 #include "recon/calibrate/rig_formats.h"
 
@@ -27,77 +28,6 @@ constexpr double kOpencvPixelShift = 0.5;  // OpenCV counts pixels from the cent
 Error bad_opencv(std::string where, std::string what, std::string remedy) {
   return {ErrorKind::bad_input, std::move(what), std::move(where), std::move(remedy)};
 }
-
-/// A key's name here and in files.
-struct FieldName {
-  const char* file;
-  const char* field;
-};
-/// Numbers: one, or a matrix row by row. OpenCV 2.4's samples and Python's users write other names.
-constexpr std::array kNumberFields = std::to_array<FieldName>({
-    {"image_width", "image_width"},
-    {"image_Width", "image_width"},
-    {"image_height", "image_height"},
-    {"image_Height", "image_height"},
-    {"camera_matrix", "camera_matrix"},
-    {"Camera_Matrix", "camera_matrix"},
-    {"cameraMatrix", "camera_matrix"},
-    {"distortion_coefficients", "distortion_coefficients"},
-    {"Distortion_Coefficients", "distortion_coefficients"},
-    {"distortionCoefficients", "distortion_coefficients"},
-    {"dist_coeffs", "distortion_coefficients"},
-    {"dist_coeff", "distortion_coefficients"},
-    {"distCoeffs", "distortion_coefficients"},
-    {"R", "R"},
-    {"T", "T"},
-    {"skew", "skew"},
-    {"alpha_c", "skew"},
-    {"square_size", "square_size"},
-    {"square_Size", "square_size"},
-    {"fisheye_model", "fisheye_model"},
-    {"xi", "xi"},
-    {"binning_x", "binning"},
-    {"binning_y", "binning"},
-});
-/// Words: the lens model and the unit.
-constexpr std::array kWordFields = std::to_array<FieldName>({
-    {"distortion_model", "lens"},
-    {"camera_model", "lens"},
-    {"lens_model", "lens"},
-    {"model_type", "lens"},
-    {"projection_model", "lens"},
-    {"unit", "unit"},
-    {"units", "unit"},
-});
-/// None of these affects rays.
-constexpr std::array kHarmlessFields = {"calibration_time",
-                                        "calibration_Time",
-                                        "nframes",
-                                        "nr_of_frames",
-                                        "nrOfFrames",
-                                        "board_width",
-                                        "board_Width",
-                                        "board_height",
-                                        "board_Height",
-                                        "board_size",
-                                        "aspectRatio",
-                                        "aspect_ratio",
-                                        "fix_aspect_ratio",
-                                        "FixAspectRatio",
-                                        "flags",
-                                        "flagValue",
-                                        "camera_name",
-                                        "avg_reprojection_error",
-                                        "rms",
-                                        "reprojection_error",
-                                        "Avg_Reprojection_Error",
-                                        "image_points",
-                                        "Image_points",
-                                        "per_view_reprojection_errors",
-                                        "grid_points",
-                                        "extrinsic_parameters",
-                                        "Per_View_Reprojection_Errors",
-                                        "Extrinsic_Parameters"};
 
 /// Keys by which another program's calibration is recognised.
 struct ForeignKey {
@@ -133,16 +63,16 @@ struct OpencvFile {
   std::vector<std::string> others;  ///< keys that aren't used
 };
 
+/// The field that a key of these tables means; nullptr for other keys.
 template <std::size_t Size>
-const char* field_of(const std::array<FieldName, Size>& fields, const std::string& key) {
+const char* field_of(const std::array<OpencvField, Size>& fields, const std::string& key) {
   const auto* known =
-      std::find_if(fields.begin(), fields.end(), [&](const FieldName& f) { return key == f.file; });
+      std::find_if(fields.begin(), fields.end(), [&](const OpencvField& f) { return key == f.key; });
   return known == fields.end() ? nullptr : known->field;
 }
 
 bool is_harmless(const std::string& key) {
-  return std::any_of(kHarmlessFields.begin(), kHarmlessFields.end(),
-                     [&](const char* known) { return key == known; });
+  return std::find(kOpencvIgnored.begin(), kOpencvIgnored.end(), key) != kOpencvIgnored.end();
 }
 
 /// Checks a matrix's stated size; a plain list has none.
@@ -178,7 +108,7 @@ Result<OpencvFile> fields_of_yaml(const std::string& text) {
   for (const auto& entry : file) {
     const auto key = entry.first.as<std::string>();
     const YAML::Node node = entry.second;
-    if (const char* const field = field_of(kNumberFields, key)) {
+    if (const char* const field = field_of(kOpencvNumbers, key)) {
       std::vector<double>& into = fields.numbers[field];
       if (node.IsScalar() && (node.Scalar() == "true" || node.Scalar() == "false")) {
         into.push_back(node.Scalar() == "true" ? 1 : 0);
@@ -188,7 +118,7 @@ Result<OpencvFile> fields_of_yaml(const std::string& text) {
       if (node.IsMap())
         EMBERLOCK_RETURN_IF_ERROR(
             check_shape(key, node["rows"].as<int>(), node["cols"].as<int>(), into.size()));
-    } else if (const char* const word = field_of(kWordFields, key)) {
+    } else if (const char* const word = field_of(kOpencvWords, key)) {
       fields.words[word] = node.as<std::string>();
     } else if (!is_harmless(key)) {
       fields.others.push_back(key);
@@ -221,14 +151,14 @@ Result<OpencvFile> fields_of_xml(const std::string& text) {
   for (const pugi::xml_node node : file.child("opencv_storage").children()) {
     if (node.type() != pugi::node_element) continue;
     const std::string key = node.name();
-    if (const char* const field = field_of(kNumberFields, key)) {
+    if (const char* const field = field_of(kOpencvNumbers, key)) {
       const pugi::xml_node data = node.child("data");
       std::vector<double>& into = fields.numbers[field];
       EMBERLOCK_RETURN_IF_ERROR(append_words(key, (data ? data : node).text().get(), into));
       if (data)
         EMBERLOCK_RETURN_IF_ERROR(check_shape(key, node.child("rows").text().as_int(),
                                               node.child("cols").text().as_int(), into.size()));
-    } else if (const char* const word = field_of(kWordFields, key)) {
+    } else if (const char* const word = field_of(kOpencvWords, key)) {
       fields.words[word] = node.text().get();
     } else if (!is_harmless(key)) {
       fields.others.push_back(key);

@@ -75,7 +75,7 @@ Result<v1::Rig> import_opencv(const std::vector<fs::path>& files, ImportNotes* n
   for (std::size_t i = 0; i < files.size(); ++i) {
     const std::string where = files[i].string();
     EMBERLOCK_ASSIGN_OR_RETURN(const std::string text, read_file(files[i], kLargestOpencvText));
-    if (files.size() == 1 && is_kalibr(text)) return parse_kalibr(text, where);
+    if (files.size() == 1 && is_kalibr(text)) return parse_kalibr(text, where, notes);
     EMBERLOCK_ASSIGN_OR_RETURN(*rig.add_cameras(), parse_opencv(text, ids[i], where, notes));
   }
   return rig;

@@ -44,7 +44,7 @@ std::string colmap_images(const v1::Rig& rig);
 Result<v1::RigCamera> parse_opencv(std::string_view text, const std::string& camera_id,
                                    const std::string& where, ImportNotes* notes = nullptr);
 /// Parses Kalibr's camchain (YAML) of pinhole cameras; the first camera is the world.
-Result<v1::Rig> parse_kalibr(std::string_view text, const std::string& where);
+Result<v1::Rig> parse_kalibr(std::string_view text, const std::string& where, ImportNotes* notes = nullptr);
 /// Whether YAML text is Kalibr's camchain.
 bool is_kalibr(std::string_view text);
 std::string opencv_yaml(const v1::RigCamera& camera);

@@ -50,6 +50,7 @@ Status ClipReader::open(std::size_t index) {
                              file_->pictures(), part.scan.frames()),
                  part.path.string(), "Split it into one file for each picture"};
   }
+  if (file_->unapplied() != part.scan.unapplied) return orientation_changed(part.path);
   return {};
 }
 

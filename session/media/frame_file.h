@@ -27,8 +27,9 @@ enum class Colours {
 };
 
 /// Frames of a foreign file: pictures (PGM, PPM, PNG, JPEG, TIFF, FITS) or a video that FFmpeg reads. A file
-/// may hold several pictures: the pages of a TIFF, JPEGs or PNMs one behind the other. Grey stays grey,
-/// colour becomes rgb8 or rgb16; a picture with alpha becomes what it shows over black (colour times alpha).
+/// may hold several pictures: the pages of a TIFF, the views of an MPO, JPEGs or PNMs one behind the other.
+/// Grey stays grey, colour becomes rgb8 or rgb16; a picture with alpha becomes what it shows over black
+/// (colour times alpha). A film's alpha has no stated meaning, so frames that aren't opaque are an error.
 /// 10..16-bit samples keep their values; bit_depth comes from the file's maximum value (a PGM with maxval
 /// 4095 has 12 bits).
 class FrameFile {

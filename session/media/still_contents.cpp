@@ -2,6 +2,7 @@
 #include "session/media/still_contents.h"
 
 #include <algorithm>
+#include <array>
 #include <cctype>
 #include <charconv>
 #include <optional>
@@ -22,45 +23,69 @@ std::uint32_t big_endian32(std::string_view s, std::size_t i) {
   return big_endian16(s, i) << 16 | big_endian16(s, i + 2);
 }
 
-/// The directories of a TIFF, or of the TIFF structure within an EXIF block. Reads beyond the end give 0.
+/// The directories of a TIFF or BigTIFF, or of the TIFF structure within an EXIF or MPF block. Reads beyond
+/// the end give 0.
 class TiffReader {
  public:
-  explicit TiffReader(std::string_view s) : s_(s), big_(!s.empty() && s[0] == 'M') {}
+  explicit TiffReader(std::string_view s)
+      : s_(s), big_endian_(!s.empty() && s[0] == 'M'), large_(get16(2) == kBigTiff) {}
 
   [[nodiscard]] std::uint32_t get16(std::size_t i) const {
     if (i + 2 > s_.size()) return 0;
-    return big_ ? big_endian16(s_, i) : byte_of(s_, i + 1) << 8 | byte_of(s_, i);
+    return big_endian_ ? big_endian16(s_, i) : byte_of(s_, i + 1) << 8 | byte_of(s_, i);
   }
   [[nodiscard]] std::uint32_t get32(std::size_t i) const {
-    return big_ ? get16(i) << 16 | get16(i + 2) : get16(i + 2) << 16 | get16(i);
+    return big_endian_ ? get16(i) << 16 | get16(i + 2) : get16(i + 2) << 16 | get16(i);
   }
+  [[nodiscard]] std::size_t get64(std::size_t i) const {
+    const std::size_t early = get32(i);
+    const std::size_t late = get32(i + 4);
+    return big_endian_ ? early << 32 | late : late << 32 | early;
+  }
+  /// Counts and offsets: 4 bytes, 8 in a BigTIFF.
+  [[nodiscard]] std::size_t word_bytes() const { return large_ ? 8 : 4; }
+  [[nodiscard]] std::size_t word(std::size_t i) const { return large_ ? get64(i) : get32(i); }
+  /// Where the offset of the first directory stands.
+  [[nodiscard]] std::size_t first_offset() const { return large_ ? 8 : 4; }
+  [[nodiscard]] std::size_t first() const { return word(first_offset()); }
   [[nodiscard]] bool has_directory(std::size_t at) const {
-    return at + 2 <= s_.size() && at + 2 + std::size_t{12} * get16(at) <= s_.size();
+    return at <= s_.size() && head_bytes() <= s_.size() - at &&
+           entries(at) <= (s_.size() - at - head_bytes()) / entry_bytes();
+  }
+  [[nodiscard]] std::size_t directory_bytes(std::size_t directory) const {
+    return head_bytes() + entry_bytes() * entries(directory);
   }
   /// Offset of a tag's entry in a directory.
   [[nodiscard]] std::optional<std::size_t> entry(std::size_t directory, std::uint32_t tag) const {
-    for (std::size_t i = 0; i < get16(directory); ++i) {
-      const std::size_t at = directory + 2 + i * 12;
+    const std::size_t end = directory + directory_bytes(directory);
+    for (std::size_t at = directory + head_bytes(); at < end; at += entry_bytes())
       if (get16(at) == tag) return at;
-    }
     return {};
   }
+  [[nodiscard]] std::size_t count_at(std::size_t entry) const { return word(entry + 4); }
+  /// Offset of an entry's values of `bytes` each. If they don't fit into the entry, they stand elsewhere.
+  [[nodiscard]] std::size_t values_at(std::size_t entry, std::size_t bytes) const {
+    const std::size_t field = entry + 4 + word_bytes();
+    return count_at(entry) <= word_bytes() / bytes ? field : word(field);
+  }
+  /// The first value of a tag.
   [[nodiscard]] std::uint32_t value(std::size_t directory, std::uint32_t tag, std::uint32_t otherwise) const {
     constexpr std::uint32_t kShort = 3;
+    constexpr std::uint32_t kLong8 = 16;
     const auto at = entry(directory, tag);
     if (!at) return otherwise;
-    if (get16(*at + 2) != kShort) return get32(*at + 8);
-    // More than two short values stand elsewhere; the first one is enough.
-    return get16(get32(*at + 4) > 2 ? get32(*at + 8) : *at + 8);
+    const std::uint32_t type = get16(*at + 2);
+    if (type == kShort) return get16(values_at(*at, 2));
+    if (type != kLong8) return get32(values_at(*at, 4));
+    return static_cast<std::uint32_t>(std::min<std::size_t>(get64(values_at(*at, 8)), UINT32_MAX));
   }
   [[nodiscard]] std::string_view text(std::size_t directory, std::uint32_t tag) const {
     const auto at = entry(directory, tag);
-    const std::size_t size = at ? get32(*at + 4) : 0;
-    const std::size_t begin = size <= 4 ? at.value_or(0) + 8 : get32(*at + 8);
-    return begin <= s_.size() ? s_.substr(begin, size) : std::string_view();
+    const std::size_t begin = at ? values_at(*at, 1) : s_.size();
+    return begin <= s_.size() ? s_.substr(begin, count_at(at.value_or(begin))) : std::string_view();
   }
   [[nodiscard]] std::size_t next(std::size_t directory) const {
-    return get32(directory + 2 + std::size_t{12} * get16(directory));
+    return word(directory + directory_bytes(directory));
   }
   [[nodiscard]] int orientation(std::size_t directory) const {
     const std::uint32_t value = this->value(directory, kOrientation, 1);
@@ -68,16 +93,23 @@ class TiffReader {
   }
 
   static constexpr std::uint32_t kOrientation = 274;
+  static constexpr std::uint32_t kBigTiff = 43;
 
  private:
+  [[nodiscard]] std::size_t head_bytes() const { return large_ ? 8 : 2; }
+  [[nodiscard]] std::size_t entry_bytes() const { return large_ ? 20 : 12; }
+  [[nodiscard]] std::size_t entries(std::size_t directory) const {
+    return large_ ? get64(directory) : get16(directory);
+  }
   std::string_view s_;
-  bool big_;
+  bool big_endian_;
+  bool large_;
 };
 
 int exif_orientation(std::string_view tiff) {
   if (!is_tiff(tiff)) return 1;
   const TiffReader reader(tiff);
-  return reader.has_directory(reader.get32(4)) ? reader.orientation(reader.get32(4)) : 1;
+  return reader.has_directory(reader.first()) ? reader.orientation(reader.first()) : 1;
 }
 
 /// The grey value of a PNG's chunk tRNS, as a decoded sample.
@@ -125,9 +157,30 @@ struct Jpeg {
   std::int64_t width = 0;
   std::int64_t height = 0;
   int orientation = 1;
-  bool indexed = false;  ///< an index (MPF) lists what follows: previews and gain maps of the first picture
-  std::size_t end = 0;   ///< behind the end marker
+  bool indexed = false;  ///< an index (MPF) lists what follows: previews and gain maps of the first picture,
+  std::vector<std::size_t> views;  ///< or the begins of further pictures
+  std::size_t end = 0;             ///< behind the end marker
 };
+
+/// The begins of the pictures that an MPF index (CIPA DC-007) lists as further views: of a stereo pair, a
+/// panorama or another multi-view set. `block` is its TIFF structure, which begins at byte `base`.
+std::vector<std::size_t> views_of(std::string_view block, std::size_t base) {
+  constexpr std::uint32_t kPictures = 0xb002;
+  constexpr std::uint32_t kMultiView = 2;  // the class in a picture's type
+  constexpr std::size_t kEntry = 16;       // bytes: attributes, size, offset, two dependent pictures
+  const TiffReader index(block);
+  std::vector<std::size_t> views;
+  if (!is_tiff(block) || !index.has_directory(index.first())) return views;
+  const auto list = index.entry(index.first(), kPictures);
+  if (!list) return views;
+  const std::size_t from = index.values_at(*list, 1);
+  for (std::size_t i = 1; i < index.count_at(*list) / kEntry && from + (i + 1) * kEntry <= block.size();
+       ++i) {
+    const std::size_t at = from + i * kEntry;
+    if ((index.get32(at) >> 16 & 0xff) == kMultiView) views.push_back(base + index.get32(at + 8));
+  }
+  return views;
+}
 
 /// The next marker behind a scan's coded data, in which 0xff is followed by 0 or a restart marker.
 std::size_t end_of_scan(std::string_view s, std::size_t at) {
@@ -164,7 +217,10 @@ Result<Jpeg> walk_jpeg(std::string_view s, const std::string& where) {
     }
     if (marker == 0xe1 && segment.starts_with(std::string_view("Exif\0\0", 6)))
       jpeg.orientation = exif_orientation(segment.substr(6));
-    if (marker == 0xe2 && segment.starts_with(std::string_view("MPF\0", 4))) jpeg.indexed = true;
+    if (marker == 0xe2 && segment.starts_with(std::string_view("MPF\0", 4))) {
+      jpeg.indexed = true;
+      jpeg.views = views_of(segment.substr(4), at + 8);
+    }
     at += 2 + length;
     if (marker != 0xda) continue;
     if (jpeg.width == 0) return damaged_picture(where, "JPEG", "no size before the first scan");
@@ -177,6 +233,12 @@ Result<Jpeg> walk_jpeg(std::string_view s, const std::string& where) {
 Result<StillContents> examine_jpegs(std::string_view s, const std::string& where) {
   EMBERLOCK_ASSIGN_OR_RETURN(const Jpeg first, walk_jpeg(s, where));
   StillContents found{{{0, first.end, first.width, first.height}}, first.orientation};
+  for (const std::size_t begin : first.views) {
+    if (begin >= s.size()) return truncated_picture(where, "MPO");
+    if (begin < found.pictures.back().end) return damaged_picture(where, "MPO", "its pictures overlap");
+    EMBERLOCK_ASSIGN_OR_RETURN(const Jpeg view, walk_jpeg(s.substr(begin), where));
+    found.pictures.push_back({begin, begin + view.end, view.width, view.height});
+  }
   if (first.indexed) return found;
   for (;;) {
     const std::size_t begin = s.find_first_not_of('\0', found.pictures.back().end);  // cameras pad buffers
@@ -223,7 +285,7 @@ Result<StillContents> examine_tiff(std::string_view s, const std::string& where)
   const TiffReader tiff(s);
   StillContents found;
   std::set<std::size_t> seen;
-  std::size_t at = tiff.get32(4);
+  std::size_t at = tiff.first();
   if (s.size() < 8 || !tiff.has_directory(at)) return truncated_picture(where, "TIFF");
   const auto take = [&](std::size_t page) {
     found.pictures.push_back({page, s.size(), tiff.value(page, kWidth, 0), tiff.value(page, kHeight, 0),
@@ -233,7 +295,7 @@ Result<StillContents> examine_tiff(std::string_view s, const std::string& where)
   std::size_t directories = 0;  // bytes
   for (; at != 0 && seen.insert(at).second; at = tiff.next(at)) {
     if (!tiff.has_directory(at)) return truncated_picture(where, "TIFF");
-    directories += 2 + std::size_t{12} * tiff.get16(at);
+    directories += tiff.directory_bytes(at);
     if (directories > s.size()) return damaged_picture(where, "TIFF", "its directories overlap");
     if (tiff.value(at, kSamples, 1) == 2)
       return Error{ErrorKind::bad_input, "the TIFF has grey and a second sample, which isn't read", where,
@@ -282,8 +344,10 @@ bool is_pnm(std::string_view content) {
 bool is_png(std::string_view content) { return content.starts_with("\x89PNG\r\n\x1a\n"); }
 bool is_jpeg(std::string_view content) { return content.starts_with("\xff\xd8\xff"); }
 bool is_tiff(std::string_view content) {
-  return content.starts_with(std::string_view("II*\0", 4)) ||
-         content.starts_with(std::string_view("MM\0*", 4));
+  // The last two are BigTIFF, with offsets of 8 bytes.
+  constexpr std::array<std::string_view, 4> kMagic = {
+      {{"II*\0", 4}, {"MM\0*", 4}, {"II+\0\b\0\0\0", 8}, {"MM\0+\0\b\0\0", 8}}};
+  return std::any_of(kMagic.begin(), kMagic.end(), [&](auto magic) { return content.starts_with(magic); });
 }
 
 Result<StillContents> examine_still(std::string_view content, const std::string& where) {
@@ -293,16 +357,22 @@ Result<StillContents> examine_still(std::string_view content, const std::string&
   return examine_pnms(content);
 }
 
+Status check_jpeg(std::string_view content, const std::string& where) {
+  EMBERLOCK_RETURN_IF_ERROR(walk_jpeg(content, where));
+  return {};
+}
+
 void select_tiff_page(std::string& content, const StillContents::Picture& page) {
   const bool big = content[0] == 'M';
   const auto put = [&](std::size_t at, std::size_t bytes, std::size_t value) {
     for (std::size_t i = 0; i < bytes; ++i)
       content[at + i] = static_cast<char>(value >> 8 * (big ? bytes - 1 - i : i) & 0xff);
   };
-  put(4, 4, page.begin);
+  const TiffReader tiff(content);
+  put(tiff.first_offset(), tiff.word_bytes(), page.begin);
   // OpenCV turns TIFFs even where it is asked for the stored rows.
-  if (const auto entry = TiffReader(content).entry(page.begin, TiffReader::kOrientation))
-    put(*entry + 8, 2, 1);
+  if (const auto entry = tiff.entry(page.begin, TiffReader::kOrientation))
+    put(tiff.values_at(*entry, 2), 2, 1);
 }
 
 }  // namespace emberlock::session

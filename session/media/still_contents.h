@@ -31,13 +31,17 @@ struct StillContents {
     std::uint32_t key = 0;  ///< of grey_key, as a decoded sample
     bool is_grey = false;   ///< set where there is a sample after the colour
   };
-  std::vector<Picture> pictures{};  ///< JPEGs or binary PNMs one behind the other, the pages of a TIFF
-  int orientation = 1;              ///< EXIF orientation 1..8 of the first picture; 1: as stored
+  /// JPEGs or binary PNMs one behind the other, the views of an MPO, the pages of a TIFF or BigTIFF.
+  std::vector<Picture> pictures{};
+  int orientation = 1;  ///< EXIF orientation 1..8 of the first picture; 1: as stored
 };
 
 /// Errors (bad_input): the first picture is truncated or damaged, or the file holds further pictures that
 /// can't be read (an animated PNG, an ImageJ stack with one directory); a TIFF of grey and a second sample.
 Result<StillContents> examine_still(std::string_view content, const std::string& where);
+
+/// Errors: the first picture of a JPEG file is truncated or damaged.
+Status check_jpeg(std::string_view content, const std::string& where);
 
 /// Makes a TIFF begin with another of its pictures, stored without an orientation.
 void select_tiff_page(std::string& content, const StillContents::Picture& page);

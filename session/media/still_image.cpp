@@ -173,7 +173,7 @@ Result<Image> decode_picture(std::string& file, const StillContents::Picture& pi
   if (is_pnm(content) && (content[1] == '5' || content[1] == '6')) return decode_binary_pnm(content, where);
   // OpenCV allocates whatever the header states and accepts truncated files, so both are checked first.
   if (!is_pnm(content)) EMBERLOCK_RETURN_IF_ERROR(check_image_size(picture.width, picture.height, where));
-  if (is_jpeg(content)) EMBERLOCK_RETURN_IF_ERROR(examine_still(content, where));
+  if (is_jpeg(content)) EMBERLOCK_RETURN_IF_ERROR(check_jpeg(content, where));
   if (content.size() > static_cast<std::size_t>(std::numeric_limits<int>::max())) {
     return Error{ErrorKind::bad_input, "larger than 2 GiB", where, "Crop the image"};
   }

@@ -123,6 +123,25 @@ std::optional<int> matrix_of(const AVFrame& frame) {
   }
 }
 
+/// Whether no pixel of a frame is transparent. Palettes are taken for opaque.
+bool frame_is_opaque(const AVFrame& frame) {
+  const AVPixFmtDescriptor* d = av_pix_fmt_desc_get(static_cast<AVPixelFormat>(frame.format));
+  const std::uint64_t flags = d->flags;
+  if ((flags & AV_PIX_FMT_FLAG_ALPHA) == 0 || (flags & AV_PIX_FMT_FLAG_PAL) != 0) return true;
+  const int alpha = d->nb_components - 1;
+  const std::uint32_t opaque = (flags & AV_PIX_FMT_FLAG_FLOAT) != 0 ? std::bit_cast<std::uint32_t>(1.0F)
+                                                                    : (1U << d->comp[alpha].depth) - 1;
+  std::vector<std::uint32_t> line(static_cast<std::size_t>(frame.width));
+  std::array<const std::uint8_t*, 4> planes{};
+  std::copy_n(frame.data, planes.size(), planes.begin());
+  for (int y = 0; y < frame.height; ++y) {
+    av_read_image_line2(line.data(), planes.data(), frame.linesize, d, 0, y, alpha, frame.width, 0,
+                        sizeof line[0]);
+    if (!std::all_of(line.begin(), line.end(), [&](std::uint32_t a) { return a == opaque; })) return false;
+  }
+  return true;
+}
+
 std::vector<std::string> unapplied_fields(const AVStream& stream) {
   std::vector<std::string> fields;
   const VideoDisplay display = display_of(stream);
@@ -298,6 +317,10 @@ class VideoFile final : public FrameFile {
 
   Result<Image> convert() {
     EMBERLOCK_RETURN_IF_ERROR(check_image_size(frame_->width, frame_->height, where_));
+    if (!frame_is_opaque(*frame_)) {
+      return Error{ErrorKind::bad_input, "is transparent, and a film doesn't state the meaning of its alpha",
+                   position(), "Compose the film over black and write it without alpha"};
+    }
     const Target target = target_of(*frame_, colours_);
     Image image(target.layout);
     if (target.transfer == Transfer::rows) copy_rows(*frame_, image);

@@ -3,6 +3,7 @@
 
 extern "C" {
 #include <libavutil/parseutils.h>
+#include <libavutil/pixdesc.h>
 }
 
 #include <algorithm>
@@ -224,6 +225,11 @@ void judge_evenness(VideoScan& scan) {
                   1e3 * interval * scan.tick.value());
 }
 
+bool format_has_alpha(AVPixelFormat format) {
+  const AVPixFmtDescriptor* d = av_pix_fmt_desc_get(format);
+  return d != nullptr && (d->flags & AV_PIX_FMT_FLAG_ALPHA) != 0;
+}
+
 }  // namespace
 
 bool VideoScan::truncated() const { return frames() < promised; }
@@ -253,6 +259,11 @@ Error size_changed(const std::string& film, std::int64_t frame, ImageSize size, 
           film, "Cut the video there, or scale all of it to one size"};
 }
 
+Error orientation_changed(const std::filesystem::path& picture) {
+  return {ErrorKind::bad_input, "has another EXIF orientation than the camera's first picture",
+          picture.string(), "Store all pictures of a camera in one orientation, or leave this one out"};
+}
+
 Result<VideoScan> scan_video(const std::filesystem::path& path) {
   EMBERLOCK_ASSIGN_OR_RETURN(const auto file, FrameFile::open(path, Colours::brightness));
   VideoScan scan;
@@ -270,6 +281,10 @@ Result<VideoScan> scan_video(const std::filesystem::path& path) {
   EMBERLOCK_ASSIGN_OR_RETURN(const AvInput input, open_av_input(path, Checking::lenient));
   scan.size = {input.decoder->width, input.decoder->height};
   EMBERLOCK_RETURN_IF_ERROR(check_image_size(scan.size.width, scan.size.height, path.string()));
+  if (format_has_alpha(input.decoder->pix_fmt)) {
+    EMBERLOCK_ASSIGN_OR_RETURN(const auto film, FrameFile::open(path));
+    EMBERLOCK_RETURN_IF_ERROR(film->next());
+  }
   scan.tick = Seconds(av_q2d(input.format->streams[input.stream]->time_base));
   scan.created_ns = creation_time(*input.format);
   scan.display = display_of(*input.format->streams[input.stream]);

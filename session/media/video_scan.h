@@ -47,6 +47,9 @@ Result<VideoScan> scan_video(const std::filesystem::path& path);
 /// Of a frame of a film, counted from 0, that has another size than those before it.
 Error size_changed(const std::string& film, std::int64_t frame, ImageSize size, ImageSize before);
 
+/// Of a picture of a camera's film that has another EXIF orientation than its first.
+Error orientation_changed(const std::filesystem::path& picture);
+
 /// Index of the first frame that breaks the regular rate: its interval differs from the median by more than a
 /// tenth (plus one tick, the rounding of containers), or its time has drifted from the regular grid of the
 /// earlier frames by a quarter of a period. Pure.

@@ -118,7 +118,10 @@ std::int64_t ClipClock::count_of(std::int64_t i) const {
 }
 
 Phase ClipClock::phase_of_frame(std::int64_t i) const {
-  return phase_at(*line, TimePoint{} + believed_period * static_cast<double>(count_of(i)), flash_period);
+  const TimePoint at = TimePoint{} + believed_period * static_cast<double>(count_of(i));
+  Phase phase = phase_at(*line, at, flash_period);
+  phase.sigma = Seconds(std::hypot(phase.sigma.value(), tau_slack.value() / std::sqrt(3.0)));  // uniform
+  return phase;
 }
 
 const NumberedRun* ClipClock::run_at(std::int64_t i) const {

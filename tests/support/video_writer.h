@@ -29,6 +29,7 @@ struct VideoFormat {
   int gop = 0;                      ///< frames from one key to the next; the codec's own where 0
   int b_frames = -1;                ///< between two others; the codec's own number where -1
   bool tinted = false;              ///< what is bright is orange, as flames are; H.264
+  int alpha = -1;                   ///< of all pixels, FFV1; none where -1
 };
 
 /// Writes gray8 images as the video that a consumer camera would make of them. Throws what goes wrong.
@@ -47,13 +48,15 @@ class VideoWriter {
     c.height = size.height;
     c.time_base = av_inv_q(format.rate);
     c.framerate = format.rate;
-    c.pix_fmt = format.codec == AV_CODEC_ID_FFV1    ? AV_PIX_FMT_GRAY8
+    c.pix_fmt = format.alpha >= 0                   ? AV_PIX_FMT_YUVA420P
+                : format.codec == AV_CODEC_ID_FFV1  ? AV_PIX_FMT_GRAY8
                 : format.codec == AV_CODEC_ID_MJPEG ? AV_PIX_FMT_YUVJ420P
                                                     : AV_PIX_FMT_YUV420P;
     c.thread_count = 1;
     if (format.gop > 0) c.gop_size = format.gop;
     if (format.b_frames >= 0) c.max_b_frames = format.b_frames;
     tinted_ = format.tinted;
+    alpha_ = format.alpha;
     if (format.codec == AV_CODEC_ID_H264) {
       av_opt_set_int(c.priv_data, "crf", format.crf, 0);
       av_opt_set(c.priv_data, "preset", format.preset, 0);
@@ -96,6 +99,9 @@ class VideoWriter {
       sws_scale(scaler_, &data, &stride, 0, frame_->height, frame_->data, frame_->linesize);
     }
     if (tinted_) tint();
+    if (alpha_ >= 0)
+      std::fill_n(frame_->data[3], std::ptrdiff_t{frame_->linesize[3]} * frame_->height,
+                  static_cast<std::uint8_t>(alpha_));
     show(count_);
   }
   /// The last image again (or the first one, empty), with this time stamp: they are multiples of 1 / rate.
@@ -147,6 +153,7 @@ class VideoWriter {
   AVStream* stream_ = nullptr;
   std::int64_t count_ = 0;
   bool tinted_ = false;
+  int alpha_ = -1;
 };
 
 }  // namespace emberlock::test

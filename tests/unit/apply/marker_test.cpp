@@ -161,13 +161,21 @@ TEST(MarkerSlow, ACutMarginLeavesTheDistance) {
   EXPECT_GE(found, cases / 4) << "else little is tested";
 }
 
-TEST(MarkerTest, AMarkerMayBeWhiteOnBlack) {
-  for (const char* words : {"aruco:4X4_50:7:80mm", "aruco:5X5_100:33:80mm", "aruco:ORIGINAL:500:80mm",
-                            "charuco:5x4:30mm:22mm:4X4_50"}) {
+TEST(MarkerTest, AMarkerOfAnyDictionaryMayBeWhiteOnBlack) {
+  for (const auto& [words, light] :
+       std::vector<std::pair<const char*, bool>>{{"aruco:4X4_50:7:80mm", true},
+                                                 {"aruco:5X5_100:33:80mm", true},
+                                                 {"aruco:6X6_250:200:80mm", false},
+                                                 {"aruco:6X6_250:200:80mm", true},
+                                                 {"aruco:7X7_250:33:80mm", false},
+                                                 {"aruco:7X7_250:33:80mm", true},
+                                                 {"aruco:ORIGINAL:500:80mm", true},
+                                                 {"charuco:5x4:30mm:22mm:4X4_50", true},
+                                                 {"charuco:5x4:30mm:26mm:6X6_250", true}}) {
     const Marker marker = parse_marker(words).value();
     const recon::CameraModel camera = before_plate(table_lens(600, kBarrel), {0.1, -0.08, 0.35});
     test::PlateLook look;
-    std::swap(look.paper, look.ink);
+    if (light) std::swap(look.paper, look.ink);
     const Image picture = Plate(marker).seen_by(camera, look);
     const auto points = find_marker(picture.view(), marker, camera.intrinsics);
     ASSERT_FALSE(points.empty()) << words;

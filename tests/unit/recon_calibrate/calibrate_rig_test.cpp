@@ -147,8 +147,8 @@ TEST(CalibrateRigSlow, MirroredCamerasAreNamedAndTheOthersSolvedWithoutThem) {
     int cameras, instants;
     std::vector<std::size_t> mirrored, named;
   };
-  const Case cases[] = {
-      {2, 12, {1}, {1}}, {2, 12, {0}, {1}}, {2, 12, {0, 1}, {}}, {5, 20, {1, 3}, {1, 3}}, {3, 16, {}, {}}};
+  const Case cases[] = {{2, 12, {1}, {1}}, {2, 12, {0}, {1}},       {2, 12, {0, 1}, {}},
+                        {3, 16, {0}, {0}}, {5, 20, {1, 3}, {1, 3}}, {3, 16, {}, {}}};
   std::uint64_t seed = 1;
   for (const Case& c : cases) {
     test::BoardRigOptions options = small_rig(c.cameras, c.instants);

@@ -12,6 +12,7 @@
 #include <opencv2/core.hpp>
 #include <opencv2/imgcodecs.hpp>
 
+#include "session/media/clip.h"
 #include "session/media/frame_file.h"
 #include "session/media/video_scan.h"
 #include "tests/support/recording.h"
@@ -44,7 +45,8 @@ class Bytes {
 };
 
 struct TiffKind {
-  bool big = false;
+  bool big = false;     ///< byte order
+  bool large = false;   ///< BigTIFF, with offsets of 8 bytes
   int orientation = 0;  ///< 0: no such tag
   int subfile = 0;      ///< of all pages but the first
   std::string description{};
@@ -59,7 +61,12 @@ std::string tiff_of(const std::vector<Image>& pages, const TiffKind& kind) {
   constexpr std::size_t kLong = 4;
   Bytes file(kind.big);
   file.text = kind.big ? "MM" : "II";
-  file.put(42, 2).put(8, 4);
+  const int word = kind.large ? 8 : 4;
+  if (kind.large) {
+    file.put(43, 2).put(8, 2).put(0, 2).put(16, 8);
+  } else {
+    file.put(42, 2).put(8, 4);
+  }
   for (std::size_t page = 0; page < pages.size(); ++page) {
     const std::size_t size = pages[page].bytes().size();
     std::map<std::size_t, Entry> entries{
@@ -73,16 +80,17 @@ std::string tiff_of(const std::vector<Image>& pages, const TiffKind& kind) {
         {279, {kLong, 1, size}}};
     if (kind.orientation != 0) entries[274] = {kShort, 1, static_cast<std::size_t>(kind.orientation)};
     if (!kind.description.empty()) entries[270] = {2, kind.description.size() + 1, 0};
-    const std::size_t after = file.text.size() + 2 + 12 * entries.size() + 4;
+    const std::size_t directory = kind.large ? 8 + 20 * entries.size() : 2 + 12 * entries.size();
+    const std::size_t after = file.text.size() + directory + static_cast<std::size_t>(word);
     const std::size_t pixels = after + kind.description.size() + 1;
     entries[273].value = pixels;
     if (!kind.description.empty()) entries[270].value = after;
-    file.put(entries.size(), 2);
+    file.put(entries.size(), kind.large ? 8 : 2);
     for (const auto& [tag, entry] : entries) {
       const int bytes = entry.type == kShort ? 2 : 4;
-      file.put(tag, 2).put(entry.type, 2).put(entry.count, 4).put(entry.value, bytes).put(0, 4 - bytes);
+      file.put(tag, 2).put(entry.type, 2).put(entry.count, word).put(entry.value, bytes).put(0, word - bytes);
     }
-    file.put(page + 1 < pages.size() ? pixels + size : 0, 4);
+    file.put(page + 1 < pages.size() ? pixels + size : 0, word);
     file.text += kind.description + '\0';
     file.text.append(reinterpret_cast<const char*>(pages[page].bytes().data()), size);
   }
@@ -113,6 +121,33 @@ std::string with_exif(const std::string& jpeg, int orientation, bool big) {
   return segment.text + exif.text + jpeg.substr(2);
 }
 
+/// JPEGs with an index (MPF), as stereo cameras write them; `type` is that of all but the first.
+std::string mpo_of(const std::vector<Image>& images, std::uint32_t type = 0x020002) {
+  constexpr std::size_t kHead = 2 + 4 + 4;  // before the index, by which it counts offsets
+  std::vector<std::string> jpegs;
+  for (const Image& image : images) jpegs.push_back(encoded(image, ".jpg"));
+  Bytes index(true);
+  index.text = "MM";
+  index.put(42, 2)
+      .put(8, 4)
+      .put(1, 2)
+      .put(0xb002, 2)
+      .put(7, 2)
+      .put(16 * jpegs.size(), 4)
+      .put(26, 4)
+      .put(0, 4);
+  std::size_t at = kHead + 26 + 16 * jpegs.size() + jpegs[0].size() - 2;
+  for (std::size_t i = 0; i < jpegs.size(); ++i) {
+    index.put(i == 0 ? 0x030000 : type, 4).put(jpegs[i].size(), 4).put(i == 0 ? 0 : at - kHead, 4).put(0, 4);
+    if (i > 0) at += jpegs[i].size();
+  }
+  Bytes file(true);
+  file.text = jpegs[0].substr(0, 2) + "\xff\xe2";
+  file.put(2 + 4 + index.text.size(), 2).text += std::string("MPF\0", 4) + index.text + jpegs[0].substr(2);
+  for (std::size_t i = 1; i < jpegs.size(); ++i) file.text += jpegs[i];
+  return file.text;
+}
+
 std::vector<Image> pictures(std::size_t count) {
   std::vector<Image> images;
   for (std::size_t i = 0; i < count; ++i) images.push_back(noise_image(kPage, i));
@@ -130,13 +165,16 @@ TEST(StillContents, AFileOfSeveralPicturesGivesThemAll) {
       jpegs += encoded(image, ".jpg");
       padded += encoded(image, ".jpg") + std::string(5, '\0');
     }
-    for (const auto& [name, content] :
-         std::vector<std::pair<std::string, std::string>>{{"a.pgm", pnms},
-                                                          {"little.tif", tiff_of(images, {})},
-                                                          {"big.tif", tiff_of(images, {.big = true})},
-                                                          {"turned.tif", tiff_of(images, {.orientation = 3})},
-                                                          {"a.mjpeg", jpegs},
-                                                          {"padded.mjpeg", padded}}) {
+    for (const auto& [name, content] : std::vector<std::pair<std::string, std::string>>{
+             {"a.pgm", pnms},
+             {"little.tif", tiff_of(images, {})},
+             {"big.tif", tiff_of(images, {.big = true})},
+             {"turned.tif", tiff_of(images, {.orientation = 3})},
+             {"large.tif", tiff_of(images, {.large = true})},
+             {"both.tif", tiff_of(images, {.big = true, .large = true, .orientation = 3})},
+             {"a.mpo", mpo_of(images)},
+             {"a.mjpeg", jpegs},
+             {"padded.mjpeg", padded}}) {
       SCOPED_TRACE(name + " of " + std::to_string(count));
       const TempFolder temp;
       put_bytes(temp / name, content);
@@ -146,7 +184,7 @@ TEST(StillContents, AFileOfSeveralPicturesGivesThemAll) {
       for (const Image& image : images) {
         const Result<Image> read = (*file)->next();
         ASSERT_TRUE(read.ok()) << read.error().message();
-        if (!name.ends_with("jpeg")) {
+        if (!name.ends_with("jpeg") && !name.ends_with("mpo")) {
           EXPECT_EQ(*read, image);
         }
       }
@@ -168,12 +206,9 @@ TEST(StillContents, PreviewsAndMasksAreNoFurtherPictures) {
     EXPECT_THAT(found->pictures, SizeIs(1)) << subfile;
   }
   EXPECT_THAT(examine_still(tiff_of(pictures(2), {.subfile = 2}), "a.tif")->pictures, SizeIs(2)) << "a page";
+  for (const std::uint32_t type : {0x000000U, 0x010002U})  // a gain map, a preview
+    EXPECT_THAT(examine_still(mpo_of(pictures(2), type), "a.jpg")->pictures, SizeIs(1)) << type;
   const std::string jpeg = encoded(pictures(1)[0], ".jpg");
-  Bytes index(true);
-  index.text = jpeg.substr(0, 2) + "\xff\xe2";
-  index.put(6, 2).text += std::string("MPF\0", 4);
-  const std::string with_gain_map = index.text + jpeg.substr(2) + jpeg;
-  EXPECT_THAT(examine_still(with_gain_map, "a.jpg")->pictures, SizeIs(1));
   EXPECT_THAT(examine_still(jpeg + "a film follows", "a.jpg")->pictures, SizeIs(1))
       << "moving pictures of phones";
 }
@@ -213,6 +248,24 @@ TEST(StillContents, AnOrientationIsReportedAndNotApplied) {
           EXPECT_THAT(unapplied[0], HasSubstr("EXIF orientation " + std::to_string(orientation)));
         }
       }
+    }
+  }
+}
+
+TEST(StillContents, APictureTurnedOtherwiseThanTheCamerasFirstIsRefused) {
+  const TempFolder temp;
+  const std::string jpeg = encoded(pictures(1)[0], ".jpg");
+  for (const auto& [first, second] : {std::pair{1, 6}, {6, 1}, {3, 6}, {3, 3}, {1, 1}}) {
+    put_bytes(temp / "0.jpg", with_exif(jpeg, first, true));
+    put_bytes(temp / "1.jpg", with_exif(jpeg, second, true));
+    const VideoScan scan = *scan_video(temp / "0.jpg");
+    ClipReader reader({{temp / "0.jpg", scan, 0}, {temp / "1.jpg", scan, 1}}, Colours::keep);
+    ASSERT_TRUE(reader.next().ok());
+    const Result<Image> next = reader.next();
+    EXPECT_EQ(next.ok(), first == second) << first << second;
+    if (!next.ok()) {
+      EXPECT_THAT(next.error().message(), HasSubstr("1.jpg"));
+      EXPECT_THAT(next.error().message(), HasSubstr("EXIF orientation"));
     }
   }
 }

@@ -130,6 +130,23 @@ TEST(VideoScan, AFilmWithoutItsEndIsTruncated) {
   EXPECT_TRUE(scan->truncated());
 }
 
+TEST(VideoScan, AFilmThatIsNotOpaqueIsRefused) {
+  for (const int alpha : {255, 254, 0}) {
+    const test::TempFolder temp;
+    write_film(temp / "film.mkv", {.codec = AV_CODEC_ID_FFV1, .rate = {25, 1}, .alpha = alpha});
+    const Result<VideoScan> scan = scan_video(temp / "film.mkv");
+    EXPECT_EQ(scan.ok(), alpha == 255) << alpha;
+    const auto film = FrameFile::open(temp / "film.mkv");
+    ASSERT_TRUE(film.ok()) << film.error().message();
+    const Result<Image> image = (*film)->next();
+    if (alpha == 255) {
+      EXPECT_EQ(bar_of(image.value()), 0);
+    } else {
+      EXPECT_THAT(image.error().message(), HasSubstr("film.mkv, frame 1: is transparent"));
+    }
+  }
+}
+
 TEST(VideoScan, ReportsADisplayMatrixAndPixelsThatAreNotSquare) {
   constexpr std::int32_t k1 = 1 << 16;
   constexpr std::int32_t kLast = 1 << 30;

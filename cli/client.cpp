@@ -21,6 +21,7 @@
 #include <sys/un.h>
 
 #include "base/file.h"
+#include "base/secret_file.h"
 #include "base/unique_fd.h"
 #include "cli/commands.h"
 #include "cli/tls_check.h"
@@ -62,7 +63,7 @@ Status try_socket(const std::string& path) {
 }
 
 Result<std::string> read_secret(const std::filesystem::path& file, const char* option) {
-  EMBERLOCK_ASSIGN_OR_RETURN(std::string text, read_file(file, 4096));
+  EMBERLOCK_ASSIGN_OR_RETURN(std::string text, read_secret_file(file, 4096, "the token"));
   while (!text.empty() && std::isspace(static_cast<unsigned char>(text.back())) != 0) text.pop_back();
   if (text.empty() || text.find_first_of(" \t\r\n") != std::string::npos)
     return Error{ErrorKind::bad_input, "holds no token", file.string(),

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <optional>
 #include <string>
 
@@ -25,6 +26,10 @@ const char* const kRemedy = "Give --box cx,cy,cz,sx,sy,sz in metres, or a box in
 
 Error no_box(std::string where, std::string what, const std::string& first) {
   return {ErrorKind::bad_input, std::move(what), std::move(where), first + ", or tell the box: " + kRemedy};
+}
+
+std::ptrdiff_t seeing_views(const std::vector<FlameMask>& masks) {
+  return std::count_if(masks.begin(), masks.end(), [](const FlameMask& mask) { return !mask.box.empty(); });
 }
 
 /// Points x with normal . x <= most.
@@ -81,23 +86,6 @@ void tighten(const std::vector<HalfSpace>& cones, Bounds& bounds) {
   }
 }
 
-/// The view without which the cones of the others meet; nothing where that isn't one view.
-std::optional<std::string> odd_view(const Scene& scene, const std::vector<FlameMask>& masks,
-                                    const Bounds& region) {
-  std::optional<std::string> odd;
-  for (std::size_t left_out = 0; left_out < scene.views.size(); ++left_out) {
-    std::vector<HalfSpace> cones;
-    for (std::size_t v = 0; v < scene.views.size(); ++v)
-      if (v != left_out && !masks[v].box.empty()) add_cone(scene.views[v].camera, masks[v].box, cones);
-    Bounds bounds = region;
-    tighten(cones, bounds);
-    if (masks[left_out].box.empty() || bounds.empty()) continue;
-    if (odd) return std::nullopt;
-    odd = scene.views[left_out].name;
-  }
-  return odd;
-}
-
 /// The bounds of the remaining voxels within the cones, to a voxel.
 Bounds bounds_of(const Hull& hull, const std::vector<HalfSpace>& cones) {
   const Grid& g = hull.grid;
@@ -123,26 +111,21 @@ Bounds bounds_of(const Hull& hull, const std::vector<HalfSpace>& cones) {
 
 Box box_of(const Bounds& bounds) { return {0.5 * (bounds.low + bounds.high), bounds.high - bounds.low}; }
 
-}  // namespace
-
-Result<Box> find_box(const Scene& scene, const std::vector<FlameMask>& masks, const ComputeOptions& compute) {
-  if (scene.views.size() < 2)
-    return no_box("box", "one view alone can't tell where the flame is", "Add a second view from elsewhere");
+/// The box of the views whose mask shows flame; nothing where their flames don't meet. Errors: no end in
+/// depth, a device that fails.
+Result<std::optional<Box>> box_of_flames(const Scene& scene, const std::vector<FlameMask>& masks,
+                                         const ComputeOptions& compute) {
   std::vector<HalfSpace> cones;
   Eigen::Vector3d middle = Eigen::Vector3d::Zero();
-  const auto seeing =
-      std::count_if(masks.begin(), masks.end(), [](const FlameMask& mask) { return !mask.box.empty(); });
+  const auto seeing = static_cast<double>(seeing_views(masks));
   Scene all;  // of the views that see flame
   for (std::size_t v = 0; v < scene.views.size(); ++v) {
     const View& view = scene.views[v];
     const bool sees = !masks[v].box.empty();
-    if (!sees && seeing < 2)
-      return no_box(view.name, "no pixel shows flame, so the box can't be found from the pictures",
-                    "Take another frame, or leave the view out");
     all.views.push_back({view.name, view.camera, {}, sees ? ViewRole::input : ViewRole::left_out});
     if (!sees) continue;
     add_cone(view.camera, masks[v].box, cones);
-    middle += view.camera.center() / static_cast<double>(seeing);
+    middle += view.camera.center() / seeing;
   }
   double spread = 0;
   for (const View& view : all.views)
@@ -150,22 +133,15 @@ Result<Box> find_box(const Scene& scene, const std::vector<FlameMask>& masks, co
   const Eigen::Vector3d far = Eigen::Vector3d::Constant(kFar * std::max(spread, 1e-3));
   Bounds bounds{middle - far, middle + far};
   tighten(cones, bounds);
-  const auto apart = [&] {
-    const auto odd = odd_view(scene, masks, {middle - far, middle + far});
-    return no_box("box",
-                  "the views' flames don't meet anywhere in space" +
-                      (odd ? ", but without " + *odd + " they do" : std::string()),
-                  "Check that the cameras' poses are right and that all pictures show the same flame");
-  };
-  if (bounds.empty()) return apart();
+  if (bounds.empty()) return std::optional<Box>();
   double edge = 0;
   for (int round = 0; round < kRounds; ++round) {
     const double before = (bounds.high - bounds.low).maxCoeff();
     const Grid grid = grid_over(box_of(bounds), kCoarseVoxels);
     const auto hull = carve(all, masks, grid, compute);
-    if (!hull) return hull.error().where == "scene" ? hull.error() : apart();
-    Bounds left = bounds_of(*hull, cones);
-    if (left.empty()) return apart();
+    if (!hull && hull.error().where == "scene") return hull.error();
+    const Bounds left = hull ? bounds_of(*hull, cones) : Bounds{};
+    if (left.empty()) return std::optional<Box>();
     bounds = {left.low.cwiseMax(bounds.low), left.high.cwiseMin(bounds.high)};
     edge = static_cast<double>(grid.edge);
     if ((bounds.high - bounds.low).maxCoeff() > kSettled * before) break;
@@ -177,7 +153,80 @@ Result<Box> find_box(const Scene& scene, const std::vector<FlameMask>& masks, co
   Box box = box_of(bounds);
   for (int a = 0; a < 3; ++a)
     box.size[a] = 1e-3 * std::ceil(1e3 * (box.size[a] * (1 + 2 * kMarginShare) + 2 * edge));
-  return box;
+  return std::optional(box);
+}
+
+/// The only view without which the flames of the others meet, and their box.
+struct OddView {
+  const View* view;
+  Box box;
+};
+std::optional<OddView> find_odd_view(const Scene& scene, const std::vector<FlameMask>& masks,
+                                     const ComputeOptions& compute) {
+  if (seeing_views(masks) < 3) return std::nullopt;
+  std::vector<FlameMask> others = masks;
+  std::optional<OddView> odd;
+  for (std::size_t v = 0; v < masks.size(); ++v) {
+    if (masks[v].box.empty()) continue;
+    others[v].box = {};
+    const auto box = box_of_flames(scene, others, compute);
+    others[v].box = masks[v].box;
+    if (!box || !*box) continue;
+    if (odd) return std::nullopt;
+    odd = OddView{&scene.views[v], **box};
+  }
+  return odd;
+}
+
+/// Whether a ray meets the box in front of its origin.
+bool meets(const Ray& ray, const Box& box) {
+  double enter = 0;
+  double leave = std::numeric_limits<double>::infinity();
+  for (int a = 0; a < 3; ++a) {
+    const double offset = box.center[a] - ray.origin[a];
+    const double half = box.size[a] / 2;
+    if (ray.direction[a] == 0) {
+      if (std::abs(offset) > half) return false;
+      continue;
+    }
+    const double one = (offset - half) / ray.direction[a];
+    const double other = (offset + half) / ray.direction[a];
+    enter = std::max(enter, std::min(one, other));
+    leave = std::min(leave, std::max(one, other));
+  }
+  return enter <= leave;
+}
+
+}  // namespace
+
+bool sees_box(const CameraModel& camera, const Box& box) {
+  constexpr int kRays = 32;  // along each side
+  const ImageSize size = camera.intrinsics.size;
+  if ((camera.camera_from_world * box.center).z() > 0) {
+    const Eigen::Vector2d pixel = camera.project(box.center);
+    if (pixel.x() >= 0 && pixel.y() >= 0 && pixel.x() <= size.width && pixel.y() <= size.height) return true;
+  }
+  for (int y = 0; y <= kRays; ++y)
+    for (int x = 0; x <= kRays; ++x)
+      if (meets(camera.ray({1.0 * size.width * x / kRays, 1.0 * size.height * y / kRays}), box)) return true;
+  return false;
+}
+
+Result<Box> find_box(const Scene& scene, const std::vector<FlameMask>& masks, const ComputeOptions& compute) {
+  if (scene.views.size() < 2)
+    return no_box("box", "one view alone can't tell where the flame is", "Add a second view from elsewhere");
+  for (std::size_t v = 0; v < scene.views.size(); ++v)
+    if (masks[v].box.empty() && seeing_views(masks) < 2)
+      return no_box(scene.views[v].name, "no pixel shows flame, so the box can't be found from the pictures",
+                    "Take another frame, or leave the view out");
+  EMBERLOCK_ASSIGN_OR_RETURN(const std::optional<Box> box, box_of_flames(scene, masks, compute));
+  if (box) return *box;
+  const std::optional<OddView> odd = find_odd_view(scene, masks, compute);
+  if (odd && !sees_box(odd->view->camera, odd->box)) return odd->box;
+  return no_box("box",
+                "the views' flames don't meet anywhere in space" +
+                    (odd ? ", but without " + odd->view->name + " they do" : std::string()),
+                "Check that the cameras' poses are right and that all pictures show the same flame");
 }
 
 }  // namespace emberlock::recon

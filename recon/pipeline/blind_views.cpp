@@ -4,12 +4,13 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <limits>
 #include <optional>
 #include <utility>
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
+
+#include "recon/hull/find_box.h"
 
 namespace emberlock::recon {
 namespace {
@@ -34,40 +35,6 @@ bool stands_out(const RadianceImage& image, const std::array<float, 3>& medians)
   for (std::size_t i = 0; i < difference.rgb.size(); ++i)
     difference.rgb[i] = std::abs(difference.rgb[i] - medians[i % 3]);
   return !noise_mask(difference).box.empty();
-}
-
-/// Whether a ray from `from` along `along` meets the box in front of its origin.
-bool meets(const Ray& ray, const Box& box) {
-  double enter = 0;
-  double leave = std::numeric_limits<double>::infinity();
-  for (int a = 0; a < 3; ++a) {
-    const double offset = box.center[a] - ray.origin[a];
-    const double half = box.size[a] / 2;
-    if (ray.direction[a] == 0) {
-      if (std::abs(offset) > half) return false;
-      continue;
-    }
-    const double one = (offset - half) / ray.direction[a];
-    const double other = (offset + half) / ray.direction[a];
-    enter = std::max(enter, std::min(one, other));
-    leave = std::min(leave, std::max(one, other));
-  }
-  return enter <= leave;
-}
-
-/// Whether the picture shows any of the box: a box smaller than the gaps of the grid of rays has its middle
-/// in the picture.
-bool sees_box(const CameraModel& camera, const Box& box) {
-  constexpr int kRays = 32;  // along each side
-  const ImageSize size = camera.intrinsics.size;
-  if ((camera.camera_from_world * box.center).z() > 0) {
-    const Eigen::Vector2d pixel = camera.project(box.center);
-    if (pixel.x() >= 0 && pixel.y() >= 0 && pixel.x() <= size.width && pixel.y() <= size.height) return true;
-  }
-  for (int y = 0; y <= kRays; ++y)
-    for (int x = 0; x <= kRays; ++x)
-      if (meets(camera.ray({1.0 * size.width * x / kRays, 1.0 * size.height * y / kRays}), box)) return true;
-  return false;
 }
 
 /// Why a view is blind; nothing where it isn't.

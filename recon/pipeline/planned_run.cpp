@@ -33,6 +33,18 @@ double validation_error(const Outcome& outcome) {
                                      : all_channels(outcome.report.input_rmse);
 }
 
+bool has_manual_effects(const ReconstructOptions& asked) { return asked.effects && asked.effects->fixed; }
+
+/// No effects; the gamma stays where the user gave it.
+EffectRequest without_effects(const ReconstructOptions& asked) {
+  Effects none;
+  if (asked.effects && asked.effects->assumed.sensor.gamma != 1) {
+    none.sensor = asked.effects->assumed.sensor;
+    none.sensor.response = Sensor::Response::gamma;
+  }
+  return {none};
+}
+
 /// The front for the scene at hand, and what the user left open of it.
 class Choices {
  public:
@@ -42,10 +54,8 @@ class Choices {
         whole_(all_) {
     std::erase_if(all_,
                   [&](const WorkPoint& p) { return !choose_grid(scene, asked, p.settings.voxels).ok(); });
-    if (asked.effects) {
-      const char* kept = asked.effects->fixed ? "none" : "auto";
-      std::erase_if(all_, [&](const WorkPoint& p) { return p.settings.effects != kept; });
-    }
+    if (has_manual_effects(asked))
+      std::erase_if(all_, [](const WorkPoint& p) { return p.settings.effects != "none"; });
     keep_iterations(asked.solve.iterations);
     open_ = asked.voxels ? at_voxels(all_, *asked.voxels) : all_;
   }
@@ -190,13 +200,14 @@ class PlannedRun {
 
   /// Whether a run with effects is to be compared with one without.
   [[nodiscard]] bool compares(const WorkPoint& point) const {
-    return !asked_.effects && asked_.solve.budget && !asked_.solve.target_rmse &&
+    return !has_manual_effects(asked_) && asked_.solve.budget && !asked_.solve.target_rmse &&
            point.settings.effects == "auto" && fits(point) && !stopped();
   }
 
   /// A search for effects may err and takes time, so a run without them comes first: whatever follows
-  /// replaces it only with a lower validation error. Seconds that are left then go to the same grid without
-  /// effects.
+  /// replaces it only with a lower validation error. It gets a quarter of the seconds, more where none of its
+  /// grids takes as little, and all of them where the search would leave too few. Seconds that are left then
+  /// go to the same grid without effects.
   Result<Outcome> run_with_and_without(const Choices& choices, const WorkPoint& point) {
     std::optional<Outcome> best;
     PlanReport plan_of_best;
@@ -209,8 +220,18 @@ class PlannedRun {
       plan_of_best = plan_;
       return {};
     };
-    if (const WorkPoint* plain = choices.plain_within(kShareOfPlain * seconds_left()))
-      EMBERLOCK_RETURN_IF_ERROR(take(*plain, 2 * kShareOfPlain * seconds_left()));
+    const double left = seconds_left();
+    struct Share {
+      double predicted, most;
+    };
+    for (const Share share : {Share{kShareOfPlain * left, 2 * kShareOfPlain * left},
+                              Share{kShareOfBudget * (left - point.seconds), left - point.seconds},
+                              Share{kShareOfBudget * left, left}}) {
+      const WorkPoint* plain = choices.plain_within(share.predicted);
+      if (plain == nullptr) continue;
+      EMBERLOCK_RETURN_IF_ERROR(take(*plain, share.most));
+      break;
+    }
     if (!best || (point.seconds <= seconds_left() && !stopped()))
       EMBERLOCK_RETURN_IF_ERROR(take(point, INFINITY));
     const WorkPoint* same_grid = choices.plain_within(kShareOfBudget * seconds_left(), point.settings.voxels);
@@ -252,7 +273,7 @@ class PlannedRun {
     plan_.words.push_back(told_to ? "stopped after the reference run"
                                   : fmt::format("{:.3g} s left no time for more than the reference run",
                                                 asked_.solve.budget->value()));
-    if (asked_.effects && asked_.effects->fixed && asked_.effects->fixed->light.source != Light::Source::none)
+    if (has_manual_effects(asked_) && asked_.effects->fixed->light.source != Light::Source::none)
       plan_.words.push_back("the reference run takes the medium for one that glows: its light was left out");
     const Grid& grid = reference_.reconstruction.hull.grid;
     plan_.voxels = std::max({grid.nx, grid.ny, grid.nz}) - 1;
@@ -268,7 +289,7 @@ class PlannedRun {
     ReconstructOptions options = asked_;
     options.voxels = point.settings.voxels;
     const bool searchable = point.settings.effects == "auto" && point.seconds <= seconds_left();
-    if (!asked_.effects && !searchable) options.effects = EffectRequest{Effects{}};
+    if (!has_manual_effects(asked_) && !searchable) options.effects = without_effects(asked_);
     if (asked_.solve.budget) {
       const double end = std::min(asked_.solve.budget->value(), task_.elapsed().value() + most_seconds);
       options.solve.budget = Seconds(std::max(1e-6, end - rendering(point)));
@@ -308,7 +329,7 @@ class PlannedRun {
             ? fmt::format("at most {} iteration{}", plan_.iterations, plan_.iterations == 1 ? "" : "s")
             : "iterations by the solver's rule";
     const char* effects =
-        plan_.effects_searched ? "searched for" : (asked_.effects ? "set by hand" : "left out");
+        plan_.effects_searched ? "searched for" : (has_manual_effects(asked_) ? "set by hand" : "left out");
     std::string words = fmt::format("{} voxels, {}, effects {}: by the front about {:.2g} s", plan_.voxels,
                                     iterations, effects, point.seconds);
     if (holds_out()) {

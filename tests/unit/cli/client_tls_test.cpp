@@ -9,6 +9,7 @@
 #include <gmock/gmock.h>
 #include <netinet/in.h>
 #include <sys/socket.h>
+#include <sys/stat.h>
 
 #include "base/unique_fd.h"
 #include "cli/client.h"
@@ -132,6 +133,10 @@ TEST_F(ClientTls, OptionsThatAreWrongAreToldBeforeAnythingIsAsked) {
   EXPECT_THAT(status({}, "absent.crt").err, HasSubstr("absent.crt"));
   write("empty", "\n");
   EXPECT_THAT(status({}, "ca.crt", "empty").err, AllOf(HasSubstr("empty"), HasSubstr("holds no token")));
+  write("public", kToken);
+  ASSERT_EQ(::chmod(path("public").c_str(), 0644), 0);
+  EXPECT_THAT(status({}, "ca.crt", "public").err,
+              AllOf(HasSubstr("everybody may read or write the token"), HasSubstr("chmod o=")));
 }
 
 TEST_F(ClientTls, APortWhereNobodyListensAndANameThatLeadsNowhereAreUnreachable) {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "recon/hull/find_box.h"
 
+#include <Eigen/Geometry>
 #include <gmock/gmock.h>
 
 #include "recon/pipeline/grid_choice.h"
@@ -88,9 +89,24 @@ TEST(FindBoxTest, OneViewAndParallelViewsHaveNoEndInDepth) {
 
 TEST(FindBoxTest, WrongPosesDontMeet) {
   Scene scene = small_flame_scene();
-  scene.views[0].camera.camera_from_world.translation += Eigen::Vector3d(0.5, 0, 0);
+  scene.views[0].camera.camera_from_world.translation += Eigen::Vector3d(0.1, 0, 0);
   EXPECT_THAT(find_box(scene, flame_masks(scene)),
               FailsWith("don't meet anywhere in space, but without camera 0 they do"));
+}
+
+TEST(FindBoxTest, ACameraThatLooksAwayIsLeftOutWhateverItShows) {
+  Scene scene = small_flame_scene();
+  Scene others = scene;
+  others.views.erase(others.views.begin() + 4);
+  const Box without = value_of(find_box(others, flame_masks(others)));
+  const Rigid3 aimed = scene.views[4].camera.camera_from_world;
+  for (const double degrees : {90, 180, 250}) {
+    const Eigen::Matrix3d turn(Eigen::AngleAxisd(degrees * M_PI / 180, Eigen::Vector3d::UnitY()));
+    scene.views[4].camera.camera_from_world = {turn * aimed.rotation, turn * aimed.translation};
+    const Box box = value_of(find_box(scene, flame_masks(scene)));
+    EXPECT_EQ(box.center, without.center) << degrees;
+    EXPECT_EQ(box.size, without.size) << degrees;
+  }
 }
 
 }  // namespace

@@ -116,6 +116,17 @@ TEST_P(Budget, WhatTheUserSetStays) {
   EXPECT_FALSE(run(options).report.plan);
 }
 
+TEST_P(Budget, ASearchForEffectsThatIsAskedForCompetesWithARunWithoutThem) {
+  ReconstructOptions options = with_budget(1);
+  options.voxels = 12;
+  options.effects = value_of(parse_effects("auto:light=0"));
+  const Scene scene = paper_scene(small_film({64, 48}, 32));
+  const Outcome outcome = value_of(reconstruct(scene, options, test::CountingClock(kTick)));
+  for (const char* words : {"effects left out: by the front", "effects searched for: by the front",
+                            "has the lowest held-out error"})
+    EXPECT_THAT(outcome.report.plan->words, Contains(HasSubstr(words)));
+}
+
 TEST_P(Budget, WithoutAHeldOutViewPromisesNoError) {
   Scene scene = flame();
   scene.views.resize(10);

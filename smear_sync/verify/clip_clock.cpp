@@ -118,10 +118,7 @@ std::int64_t ClipClock::count_of(std::int64_t i) const {
 }
 
 Phase ClipClock::phase_of_frame(std::int64_t i) const {
-  const TimePoint at = TimePoint{} + believed_period * static_cast<double>(count_of(i));
-  Phase phase = phase_at(*line, at, flash_period);
-  phase.sigma = Seconds(std::hypot(phase.sigma.value(), tau_slack.value() / std::sqrt(3.0)));  // uniform
-  return phase;
+  return phase_at(*line, TimePoint{} + believed_period * static_cast<double>(count_of(i)), flash_period);
 }
 
 const NumberedRun* ClipClock::run_at(std::int64_t i) const {

@@ -63,8 +63,7 @@ struct ClipClock {
   Seconds flash_period;     ///< P
   Seconds period_sigma;     ///< standard error of timing.frame_period, in seconds of the strobe
   std::vector<ClipPoint> points;
-  /// How much larger or smaller all taus may equally well be, if K isn't known and the dots used had wrapped.
-  /// Zero if K is known.
+  /// How much larger all taus may be, if K isn't known and the dots used had wrapped. Zero if K is known.
   Seconds tau_slack{};
   int lit = 0;                              ///< number of frames that show the lamp
   std::vector<FlashSeen> seen;              ///< by frame: whether the strobe lit it
@@ -73,8 +72,7 @@ struct ClipClock {
 
   /// The camera's frame count at index `i` of the file, starting at that of index 0.
   [[nodiscard]] std::int64_t count_of(std::int64_t i) const;
-  /// tau of the read phase of frame `i`, modulo P, with the standard error of the line and of an unknown K.
-  /// Requires a line.
+  /// tau of the read phase of frame `i`, modulo P. Requires a line.
   [[nodiscard]] Phase phase_of_frame(std::int64_t i) const;
   /// Whether d is known, from the dots' walk or from `options`.
   [[nodiscard]] bool direction_known(const ClipOptions& options) const {

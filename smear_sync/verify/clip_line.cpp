@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <numeric>
 #include <set>
 #include <utility>
 
@@ -82,9 +81,7 @@ ShiftsKnown what_is_known(std::span<const FrameReading> frames, const ClipOption
     std::vector<ShiftsGuess> guesses = measured_shifts(clock.mode, range);
     if (!guesses.empty()) return {std::move(guesses)};
   }
-  if (dots[1] <= dots[0]) return {{{range.least, 1}}, DotsUsed::ahead};
-  // Every K of the range is equally probable; the middle one has the smallest expected error.
-  return {{{std::midpoint(range.least, range.most), 1}}, DotsUsed::behind};
+  return {{{range.least, 1}}, dots[1] > dots[0] ? DotsUsed::behind : DotsUsed::ahead};
 }
 
 /// Phases against the camera's own count. Frames whose count is uncertain because of losses are left out.
@@ -294,7 +291,7 @@ void find_line(std::span<const FrameReading> frames, const ClipOptions& options,
   clock.line = lines.size() > 1 ? mean_line(lines, clock.flash_period) : lines[0].line;
   if (known.use == DotsUsed::behind) {
     const ShiftsRange range = possible_shifts(clock.timing);
-    clock.tau_slack = Rows(0.5 * (range.most - range.least)) * options.row_time;
+    clock.tau_slack = Rows(range.most - range.least) * options.row_time;
   }
   clock.timing.frame_period = clock.flash_period - clock.believed_period * (clock.line->rate.value() * 1e-6);
   clock.period_sigma = clock.believed_period * (clock.line->rate_sigma.value() * 1e-6);

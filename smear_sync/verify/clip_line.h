@@ -20,9 +20,8 @@ ShiftsRange possible_shifts(const CcdTiming& timing);
 /// the state, and the reason if there is no line. Wrapped dots are K rows off the others. If K is known, all
 /// dots are used. If the dots' walk leaves a few values of K open, each gives a line with a probability; the
 /// result is their mean, with the resulting deviation. If nothing is known of K, only the dots on the side
-/// with more of them are used; if those had wrapped, K is the middle of its range, and tau_slack half the
-/// range. `frames` must all have the lamp at row clock.lamp; clock.mode, timing and numbers contain what is
-/// known so far.
+/// with more of them are used, and tau_slack is the uncertainty that K causes if those had wrapped. `frames`
+/// must all have the lamp at row clock.lamp; clock.mode, timing and numbers contain what is known so far.
 void find_line(std::span<const FrameReading> frames, const ClipOptions& options, ClipClock& clock);
 
 }  // namespace emberlock::smear

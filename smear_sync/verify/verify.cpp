@@ -60,6 +60,8 @@ void compare(const CameraVerdict& reference, CameraVerdict& camera, const WholeF
     error = wrap_symmetric(error, flashes);
   }
   camera.error = wrap_symmetric(error, frame);
+  const auto slack = std::max(camera.clock.tau_slack, reference.clock.tau_slack);
+  camera.sigma = Seconds(std::hypot(camera.sigma.value(), slack.value()));
 
   const ClipClock& a = camera.clock;
   const ClipClock& b = reference.clock;

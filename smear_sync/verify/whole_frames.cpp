@@ -10,7 +10,6 @@
 
 #include "base/one_to_one.h"
 #include "smear_sync/clocks/shared_pattern.h"
-#include "smear_sync/verify/clip_line.h"
 
 namespace emberlock::smear {
 namespace {
@@ -65,18 +64,17 @@ OwnScale own_scale(const ClipClock& clock, const ClipOptions& options, std::int6
     return own;
   }
   own.times = strobe_times(clock);
-  if (const double slack = clock.tau_slack / clock.flash_period; slack > 0)
-    own.slacks.insert(own.slacks.end(), {-slack, slack});
+  if (clock.tau_slack > Seconds(0)) own.slacks.push_back(-(clock.tau_slack / clock.flash_period));
   if (!clock.direction_known(options)) {
     // With the other read direction, the dot would be K rows minus its distance from the lamp. The flash that
     // lit the picture would be the same, but not the frame's start.
     const double start = own.start(at_place);
     const double tau = 1 - (start - std::floor(start));
     // If K is unknown too, a dot that isn't wrapped would be wrapped with the other direction.
-    const ShiftsRange range = clock.mode.shifts || options.shifts
-                                  ? ShiftsRange{clock.timing.shifts, clock.timing.shifts}
-                                  : possible_shifts(clock.timing);
-    for (const int shifts : {range.least, range.most}) {
+    const bool shifts_known = clock.mode.shifts || options.shifts;
+    const double most = std::floor((clock.timing.frame_period / options.row_time).value());
+    for (const double shifts : {static_cast<double>(clock.timing.shifts),
+                                shifts_known ? static_cast<double>(clock.timing.shifts) : most}) {
       const double other = Rows(shifts) * options.row_time / clock.flash_period - tau;
       own.slacks.push_back(tau - std::clamp(other, 0.0, 1.0));
     }

@@ -177,6 +177,7 @@ std::vector<Misfit> find_misfits(const BoardSightings& sightings, const std::vec
                                  const std::vector<PlacedSighting>& placed, const RigCalibration& result) {
   const std::vector<std::size_t> group = largest_group(placed, sightings.cameras.size());
   std::vector<std::string> faults;
+  faults.reserve(group.size());
   for (const std::size_t camera : group) faults.push_back(fault_of(result, placed, camera));
   if (group.size() < 2 || std::all_of(faults.begin(), faults.end(), [](const auto& f) { return f.empty(); }))
     return {};

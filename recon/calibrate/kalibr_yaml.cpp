@@ -69,7 +69,7 @@ Status check_kalibr_keys(const YAML::Node& camera, const std::string& where, std
     if (known == kKalibrFields.end()) unknown.insert(key);
     if (known == kKalibrFields.end() || known->use != FieldUse::refused || entry.second.as<double>() == 0)
       continue;
-    return bad_kalibr(where + "." + key, "a rolling shutter isn't modelled",
+    return bad_kalibr(fmt::format("{}.{}", where, key), "a rolling shutter isn't modelled",
                       "Calibrate with a global shutter, or with pictures of boards that stand still");
   }
   return {};
@@ -101,12 +101,13 @@ Result<v1::Rig> rig_of_kalibr(const YAML::Node& file, const std::string& where, 
   CameraModel camera;
   for (std::size_t n = 0;; ++n) {
     const std::string id = "cam" + std::to_string(n);
+    const std::string camera_at = fmt::format("{}: {}", where, id);
     const YAML::Node node = file[id];
     if (!node || !node.IsMap()) break;
-    EMBERLOCK_RETURN_IF_ERROR(check_kalibr_keys(node, where + ": " + id, unknown));
-    EMBERLOCK_ASSIGN_OR_RETURN(camera.intrinsics, kalibr_lens(node, where + ": " + id));
+    EMBERLOCK_RETURN_IF_ERROR(check_kalibr_keys(node, camera_at, unknown));
+    EMBERLOCK_ASSIGN_OR_RETURN(camera.intrinsics, kalibr_lens(node, camera_at));
     if (n > 0) {
-      EMBERLOCK_ASSIGN_OR_RETURN(const Rigid3 step, kalibr_step(node, where + ": " + id));
+      EMBERLOCK_ASSIGN_OR_RETURN(const Rigid3 step, kalibr_step(node, camera_at));
       camera.camera_from_world = chained(step, camera.camera_from_world);
     }
     *rig.add_cameras() = rig_camera_of(id, camera);

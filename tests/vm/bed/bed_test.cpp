@@ -1,27 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <chrono>
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
-#include <functional>
-#include <thread>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "tests/support/wait.h"
 #include "tests/vm/support/qmp.h"
 
 // What the virtual machine's tests stand on: drivers of the kernel, udevd, and USB devices that come and go.
 namespace emberlock {
 namespace {
-
-bool within_five_seconds(const std::function<bool()>& holds) {
-  for (int i = 0; i < 100; ++i) {
-    if (holds()) return true;
-    std::this_thread::sleep_for(std::chrono::milliseconds(50));
-  }
-  return false;
-}
 
 int usb_cameras() {
   int n = 0;
@@ -35,7 +25,7 @@ int usb_cameras() {
 
 TEST(VmBed, AModuleLoadsAndUdevNamesItsDevice) {
   ASSERT_EQ(std::system("modprobe vivid n_devs=1"), 0);
-  EXPECT_TRUE(within_five_seconds(
+  EXPECT_TRUE(test::wait_until(
       [] { return std::filesystem::exists("/dev/v4l/by-path/platform-vivid.0-video-index0"); }));
   EXPECT_EQ(std::system("modprobe -r vivid"), 0);
 }
@@ -46,10 +36,10 @@ TEST(VmBed, AUsbCameraIsPluggedInAndOut) {
   const int before = usb_cameras();
   auto plugged = qmp->plug_mtp("bed");
   ASSERT_TRUE(plugged.ok()) << plugged.error().message();
-  EXPECT_TRUE(within_five_seconds([&] { return usb_cameras() == before + 1; }));
+  EXPECT_TRUE(test::wait_until([&] { return usb_cameras() == before + 1; }));
   auto unplugged = qmp->unplug("bed");
   ASSERT_TRUE(unplugged.ok()) << unplugged.error().message();
-  EXPECT_TRUE(within_five_seconds([&] { return usb_cameras() == before; }));
+  EXPECT_TRUE(test::wait_until([&] { return usb_cameras() == before; }));
 }
 
 TEST(VmBed, TheMonitorSaysWhatItRefuses) {

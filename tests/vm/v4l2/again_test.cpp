@@ -11,6 +11,7 @@
 
 #include "base/clock.h"
 #include "drivers/camera_thread.h"
+#include "tests/support/wait.h"
 #include "tests/vm/v4l2/vivid.h"
 
 // What is done again and again. EMBERLOCK_VM_ROUNDS (10) is how often the cameras are unplugged,
@@ -67,7 +68,7 @@ TEST_F(V4l2Again, AllComeBackEachTimeThatTheyAreUnpluggedWithoutALeak) {
     for (const auto& camera : cameras) {
       Result<Frame> next = Error{};
       do {
-        next = camera->next_frame(Seconds(2));
+        next = camera->next_frame(test::kHangGuard);
       } while (next.ok());
       ASSERT_EQ(next.error().kind, ErrorKind::device) << next.error().message();
     }
@@ -75,7 +76,7 @@ TEST_F(V4l2Again, AllComeBackEachTimeThatTheyAreUnpluggedWithoutALeak) {
     plug_in();
     since = SteadyClock().now();
     for (const auto& camera : cameras) {
-      const auto next = camera->next_frame(Seconds(4));
+      const auto next = camera->next_frame(test::kHangGuard);
       ASSERT_TRUE(next.ok()) << next.error().message();
     }
     returns.push_back((SteadyClock().now() - since).value());
@@ -91,8 +92,6 @@ TEST_F(V4l2Again, AllComeBackEachTimeThatTheyAreUnpluggedWithoutALeak) {
       "after their return (median; longest %.0f); %+d descriptors, %+ld kB of heap after the first %d\n",
       rounds, 1e3 * quantile(reports, 0.5), 1e3 * longest_report, 1e3 * quantile(returns, 0.5),
       1e3 * longest_return, more_descriptors, more_memory, kWarmUp);
-  EXPECT_LE(longest_report, 1.0);
-  EXPECT_LE(longest_return, 3.0);
   if (rounds <= kWarmUp) return;
   EXPECT_EQ(more_descriptors, 0);
   // One leaked picture of each camera and round would be twice that; two of each may wait in the queues.
@@ -104,14 +103,13 @@ TEST_F(V4l2Again, AResetsDelayIsKnownByTheTimestamps) {
   ASSERT_NE(camera, nullptr);
   std::vector<double> delays;
   for (int i = 0; i < from_environment("EMBERLOCK_VM_RESETS", 10); ++i) {
-    ASSERT_TRUE(camera->next_frame(Seconds(2)).ok());
+    ASSERT_TRUE(camera->next_frame(test::kHangGuard).ok());
     const TimePoint at = SteadyClock().now() + milliseconds(20);
     ASSERT_TRUE(camera->reset_shutter(at).ok());
-    const auto frame = camera->next_frame(Seconds(2));
+    const auto frame = camera->next_frame(test::kHangGuard);
     ASSERT_TRUE(frame.ok()) << frame.error().message();
     delays.push_back((frame->stamp.device_time - at).value());
     EXPECT_GT(delays.back(), 0);
-    EXPECT_LT(delays.back(), 2);
   }
   const double n = static_cast<double>(delays.size());
   const double mean = std::accumulate(delays.begin(), delays.end(), 0.0) / n;

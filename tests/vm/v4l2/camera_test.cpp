@@ -9,6 +9,7 @@
 #include <unistd.h>
 
 #include "base/clock.h"
+#include "tests/support/wait.h"
 #include "tests/vm/v4l2/vivid.h"
 
 // One camera of the kernel's vivid, filmed as any.
@@ -25,7 +26,7 @@ class V4l2Vivid : public Vivid {
   static std::vector<Frame> film(drivers::Camera& camera, int n) {
     std::vector<Frame> frames;
     for (int i = 0; i < n; ++i) {
-      auto frame = camera.next_frame(Seconds(2));
+      auto frame = camera.next_frame(test::kHangGuard);
       EXPECT_TRUE(frame.ok()) << frame.error().message();
       if (!frame) return frames;
       frames.push_back(*frame);
@@ -190,7 +191,7 @@ TEST_F(V4l2Vivid, IsLostOnceByAFatalErrorAndFoundAgain) {
   Vivid::control(0, "Inject Fatal Streaming Error", "1");
   Result<Frame> next = Error{};
   do {
-    next = camera->next_frame(Seconds(1));
+    next = camera->next_frame(test::kHangGuard);
   } while (next.ok());
   EXPECT_EQ(next.error().kind, ErrorKind::device);
   const Status started = camera->start();

@@ -34,8 +34,8 @@ Status ClipReader::seek(std::int64_t place) {
     ahead = place - part.first;
   }
   Status moved = part.scan.counted || ahead == 0
-                           ? file_->skip(ahead)
-                           : file_->seek(part.scan.ticks[static_cast<std::size_t>(ahead)]);
+                     ? file_->skip(ahead)
+                     : file_->seek(part.scan.ticks[static_cast<std::size_t>(ahead)]);
   if (!moved.ok()) file_.reset();  // it isn't at `place_`
   return moved;
 }

@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 
 #include "tests/support/shell.h"
+#include "tests/support/wait.h"
 #include "tests/vm/v4l2/vivid.h"
 
 // The program itself, with cameras of the kernel's vivid plugged in.
@@ -50,9 +51,7 @@ TEST_F(DevicesVerb, WatchSaysWhatWentAndWhatCame) {
   const std::string command = std::string(EMBERLOCK_PROGRAM) + " devices watch >" + heard + " 2>&1 & echo $!";
   const std::string process = shell(command).output;
   const auto said = [&](const std::string& words) {
-    return shell("for i in $(seq 100); do grep -q '" + words + "' " + heard +
-                 " && exit 0; sleep 0.1; done; exit 1")
-               .status == 0;
+    return test::wait_until([&] { return shell("grep -q '" + words + "' " + heard).status == 0; });
   };
   EXPECT_TRUE(said(id(1))) << shell("cat " + heard).output;
   unplug();

@@ -285,7 +285,8 @@ void Conductor::end() {
 }
 
 void Conductor::salvaged(const std::string& session, const JobResult& outcome) {
-  if (!outcome.ok() && outcome.error().kind == ErrorKind::refused)  // by who still records it, or cancelled
+  // By who still records it, or cancelled; or for the vanished disk, which watch_disk() reports.
+  if (!outcome.ok() && (outcome.error().kind == ErrorKind::refused || !parts_.store.check_disk().ok()))
     return note({v1::AMBER, Remark::Code::not_salvaged, session, outcome.error()});
   if (!outcome.ok()) {
     static_cast<void>(happen(FaultRaised{{v1::Fault::SALVAGE_FAILED, session}, v1::AMBER, outcome.error()}));

@@ -105,7 +105,7 @@ Result<std::unique_ptr<openvdb::io::File>> opened(const std::filesystem::path& p
   EMBERLOCK_RETURN_IF_ERROR(check_volume_file(path));
   openvdb::initialize();
   auto file = std::make_unique<openvdb::io::File>(path.string());
-  file->open();
+  file->open(false);  // by delayed loading blocks would be found by sizes in metadata, which nothing checks
   return file;
 }
 

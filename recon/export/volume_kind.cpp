@@ -9,6 +9,7 @@
 #include "recon/export/certificate.h"
 #include "recon/export/vdb_header.h"
 #include "recon/export/vdb_identity.h"
+#include "recon/export/vdb_layout.h"
 
 namespace emberlock::recon {
 namespace {
@@ -75,8 +76,10 @@ Status check_volume_file(const std::filesystem::path& path) {
     changed.kind = ErrorKind::bad_input;
     return changed;
   }
-  if (*sealed || is_identified_by_content(path)) return {};
-  return not_a_volume(path, "carries no certificate, and its identifier isn't that of its bytes");
+  if (!*sealed && !is_identified_by_content(path))
+    return not_a_volume(path, "carries no certificate, and its identifier isn't that of its bytes");
+  std::ifstream file(path, std::ios::binary);
+  return check_vdb_layout(file, path.string());
 }
 
 }  // namespace emberlock::recon

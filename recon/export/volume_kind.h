@@ -7,7 +7,8 @@
 #include "base/result.h"
 
 // Which files may be handed to OpenVDB. Its readers trust each size that a file states: a damaged one makes
-// them allocate gigabytes. So a file is read only when all of its bytes are as Emberlock wrote them.
+// them allocate gigabytes. So a file is read only when all of its bytes are as they were sealed, and its
+// layout is one that Emberlock writes: a seal without a signature can be forged.
 namespace emberlock::recon {
 
 /// A marker at the end of the file, which OpenVDB's readers don't read (they use offsets).
@@ -27,8 +28,8 @@ enum class VolumeKind {
 Result<VolumeKind> kind_of_volume(const std::filesystem::path& path);
 
 /// Succeeds where the file is a volume whose bytes are as they were written: by its seal (certificate.h), or,
-/// without a certificate, by its identifier (vdb_identity.h). Errors (bad_input): any other kind, changed
-/// bytes.
+/// without a certificate, by its identifier (vdb_identity.h), and their sizes agree (vdb_layout.h). Errors
+/// (bad_input): any other kind, changed bytes, another layout.
 Status check_volume_file(const std::filesystem::path& path);
 
 }  // namespace emberlock::recon

@@ -184,6 +184,25 @@ TEST_F(EngineThreads, ASessionInSalvageIsShownAndRefusedForAllElseWhileARecordin
   EXPECT_TRUE((*verification)->wait(test::kHangLimit)->ok());
 }
 
+TEST_F(EngineThreads, ADiskThatVanishesIsTheOnlyFaultOfItsRecording) {
+  namespace fs = std::filesystem;
+  fs::create_directory(temp_.path() / "disk");
+  fs::create_directory_symlink(temp_.path() / "disk", sessions());
+  start();
+  ASSERT_TRUE(engine_->record(take()).ok());
+  fs::remove(sessions());
+  fs::create_directory_symlink("/proc", sessions());  // any other file system
+  EXPECT_EQ(engine_->stop_recording()->state(), v1::RecordingStatus::FAILED);
+  ASSERT_TRUE(wait_until([&] {
+    const auto notices = board_.notices(0);
+    return std::any_of(notices.begin(), notices.end(), [](const v1::Notice& n) {
+      return n.text().find("not a session") != std::string::npos;
+    });
+  }));
+  for (const v1::Fault& fault : board_.status()->faults())
+    EXPECT_NE(fault.kind(), v1::Fault::SALVAGE_FAILED) << fault.ShortDebugString();
+}
+
 TEST_F(EngineThreads, EndedItRefusesWhatIsAskedAndStillFinishesItsRecording) {
   start();
   ASSERT_TRUE(engine_->record(take()).ok());

@@ -18,6 +18,7 @@
 #include "base/random.h"
 #include "recon/export/certificate.h"
 #include "recon/export/volume_file.h"
+#include "session/seal.h"
 #include "tests/support/recording.h"
 #include "tests/support/results.h"
 
@@ -93,17 +94,30 @@ std::string mutated(const std::string& bytes, RandomStream& random) {
   }
 }
 
-void expect_no_mutation_is_read(const std::string& whole, int count,
-                                const std::function<std::string(const std::string&)>& read) {
+/// Calls act(mutation, its number), which may take no more than 100 MB.
+void each_mutation(const std::string& whole, int count,
+                   const std::function<void(const std::string&, int)>& act) {
   rusage before{}, after{};
   ASSERT_EQ(::getrusage(RUSAGE_SELF, &before), 0);
   RandomStream random(11, 1);
-  for (int i = 0; i < count; ++i) {
-    const std::string bytes = mutated(whole, random);
-    EXPECT_EQ(read(bytes) == "holds", bytes == whole) << i;
-  }
+  for (int i = 0; i < count; ++i) act(mutated(whole, random), i);
   ASSERT_EQ(::getrusage(RUSAGE_SELF, &after), 0);
   EXPECT_LT(after.ru_maxrss - before.ru_maxrss, 100'000) << "kB";
+}
+
+void expect_no_mutation_is_read(const std::string& whole, int count,
+                                const std::function<std::string(const std::string&)>& read) {
+  each_mutation(whole, count, [&](const std::string& bytes, int i) {
+    EXPECT_EQ(read(bytes) == "holds", bytes == whole) << i;
+  });
+}
+
+/// With a seal that is that of these bytes, as long as they have room for one.
+std::string forged(std::string bytes) {
+  const std::size_t seal = bytes.find("emberlock-seal-1");
+  if (seal == std::string::npos || seal + session::kSealLength > bytes.size()) return bytes;
+  bytes.replace(seal, session::kSealLength, session::blank_seal(nullptr));
+  return session::sealed(std::move(bytes), seal, nullptr, session::kSealsVolume);
 }
 
 TEST_F(VolumeKindTest, NoMutationIsReadOrTakesMemory) {
@@ -112,6 +126,23 @@ TEST_F(VolumeKindTest, NoMutationIsReadOrTakesMemory) {
 
 TEST_F(VolumeKindTestSlow, NoMutationIsReadOrTakesMemory) {
   expect_no_mutation_is_read(bytes_of(whole_), 2000, [this](const std::string& b) { return read(b); });
+}
+
+TEST_F(VolumeKindTest, AForgedSealTakesNoMemoryEither) {
+  const fs::path path = folder_ / "forged.vdb";
+  int held = 0;
+  const auto read_all = [&](const std::string& bytes) {
+    put_bytes(path, forged(bytes));
+    (void)read_shared_volume(path);
+    (void)read_grid(path, "density");
+    return read_volume(path);
+  };
+  const std::string whole = bytes_of(whole_);
+  each_mutation(whole, 200, [&](const std::string& bytes, int) { held += read_all(bytes).ok() ? 1 : 0; });
+  EXPECT_GT(held, 10) << "the seals weren't forged";
+  const std::size_t dimensions = whole.find("emberlock_dimensions") + 20 + 4 + 5 + 4;
+  const std::string huge = std::string("\0\x10\0\0\0\x10\0\0\0\x10\0\0", 12);  // 4096 along each edge
+  EXPECT_THAT(read_all(replaced(whole, dimensions, huge)), FailsWith("more voxels than a file of its size"));
 }
 
 TEST_F(VolumeKindTest, EachKindIsNamed) {

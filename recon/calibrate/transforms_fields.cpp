@@ -32,7 +32,7 @@ std::string letters_of(std::string_view key) {
 
 bool is_zero(const json& value) {
   if (value.is_array()) return std::all_of(value.begin(), value.end(), is_zero);
-  return value == 0 || value == false || value.is_null();
+  return value.is_null() || value == 0 || (value.is_boolean() && !value.get<bool>());
 }
 bool is_one_of(const json& value, std::initializer_list<const char*> words) {
   if (!value.is_string()) return false;

@@ -34,7 +34,7 @@ void expect_moved(const DriftReport& report, std::size_t moved) {
     EXPECT_EQ(report.cameras[c].verdict, c == moved ? DriftVerdict::moved : DriftVerdict::still) << c;
 }
 
-TEST(DriftSlow, ARigThatStoodStillHolds) {
+TEST(Drift, ARigThatStoodStillHolds) {
   for (const std::uint64_t seed : {1, 2}) {
     const test::BoardRig rig = test::board_rig(later_views(seed));
     const DriftReport report = drift_of(test::rig_file_of(rig), rig.sightings);
@@ -45,7 +45,7 @@ TEST(DriftSlow, ARigThatStoodStillHolds) {
   }
 }
 
-TEST(DriftSlow, TheCameraThatWasKnockedIsNamedWithItsMotion) {
+TEST(Drift, TheCameraThatWasKnockedIsNamedWithItsMotion) {
   const test::BoardRig rig = test::board_rig(later_views(3));
   v1::Rig file = test::rig_file_of(rig);
   const Eigen::Vector3d aside(1e-3, 0, 0);
@@ -82,7 +82,7 @@ TEST(DriftSlow, AFoundRigsSmallTurnIsNamedAndNoNeighbour) {
   EXPECT_LT(turned.cameras[2].turn_sigma, 0.05 * kDegree);
 }
 
-TEST(DriftSlow, AChangedZoomIsTheLenss) {
+TEST(Drift, AChangedZoomIsTheLenss) {
   const test::BoardRig rig = test::board_rig(later_views(4));
   v1::Rig file = test::rig_file_of(rig);
   v1::Calibration& c = *file.mutable_cameras(1)->mutable_calibration();
@@ -92,7 +92,7 @@ TEST(DriftSlow, AChangedZoomIsTheLenss) {
   EXPECT_THAT(report.cameras[1].why, HasSubstr("zoom or focus"));
 }
 
-TEST(DriftSlow, ARigThatDoesntFitIsAnError) {
+TEST(Drift, ARigThatDoesntFitIsAnError) {
   const test::BoardRig rig = test::board_rig(later_views(5));
   v1::Rig file = test::rig_file_of(rig);
   file.mutable_cameras(1)->set_width(1280);
@@ -128,7 +128,7 @@ TEST(LampDriftSlow, StillRigsHoldAndTheCameraThatTurnedIsNamed) {
   EXPECT_EQ(false_alarms, 0) << "one in a thousand is meant";
 }
 
-TEST(LampDriftSlow, OnePlaceTellsOnlyATurn) {
+TEST(LampDrift, OnePlaceTellsOnlyATurn) {
   const test::BoardRig rig = lamp_rig(6, 7);
   const auto lamps = test::lamp_sightings(rig, test::lamp_places(rig, 1, 7), 0.3, 7);
   v1::Rig file = test::rig_file_of(rig);
@@ -143,7 +143,7 @@ TEST(LampDriftSlow, OnePlaceTellsOnlyATurn) {
   EXPECT_NEAR(camera.turn.norm() * 180 / M_PI, 0.5, 0.15);
 }
 
-TEST(LampDriftSlow, TwoCamerasTellThatOneOfThemMoved) {
+TEST(LampDrift, TwoCamerasTellThatOneOfThemMoved) {
   for (const int places : {1, 4, 8}) {
     const test::BoardRig rig = lamp_rig(2, 3);
     const auto lamps = test::lamp_sightings(rig, test::lamp_places(rig, places, 3), 0.2, 3);
@@ -157,7 +157,7 @@ TEST(LampDriftSlow, TwoCamerasTellThatOneOfThemMoved) {
   }
 }
 
-TEST(LampDriftSlow, ALampThatNoTwoCamerasSeeIsAnError) {
+TEST(LampDrift, ALampThatNoTwoCamerasSeeIsAnError) {
   const test::BoardRig rig = lamp_rig(3, 2);
   auto lamps = test::lamp_sightings(rig, test::lamp_places(rig, 3, 2), 0.2, 2);
   std::erase_if(lamps.sightings, [](const auto& s) { return s.camera != s.instant; });

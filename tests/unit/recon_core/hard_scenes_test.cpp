@@ -76,9 +76,9 @@ TEST_P(HardSceneSlow, PixelsAsWideAsTheVoxelsDoNotDiverge) {
   }
 }
 
-TEST_P(HardSceneSlow, OneView) { expect_stable(solve_on(scene_of(1), 16)); }
-TEST_P(HardSceneSlow, TwoOppositeViews) { expect_stable(solve_on(scene_of(2), 16)); }
-TEST_P(HardSceneSlow, TenViewsWithinTenDegrees) {
+TEST_P(HardScene, OneView) { expect_stable(solve_on(scene_of(1), 16)); }
+TEST_P(HardScene, TwoOppositeViews) { expect_stable(solve_on(scene_of(2), 16)); }
+TEST_P(HardScene, TenViewsWithinTenDegrees) {
   expect_stable(solve_on(scene_of(10, 32.8, std::numbers::pi / 18), 16));
 }
 
@@ -89,7 +89,7 @@ TEST_P(HardSceneSlow, ExtinctionFromNearlyNoneToAMillionAMetre) {
   }
 }
 
-TEST_P(HardSceneSlow, SaturatedViews) {
+TEST_P(HardScene, SaturatedViews) {
   Scene scene = scene_of(10);
   for (View& view : scene.views)
     edit(view.image, [](RadianceImage& image) {
@@ -98,7 +98,7 @@ TEST_P(HardSceneSlow, SaturatedViews) {
   expect_stable(solve_on(scene, 16));
 }
 
-TEST_P(HardSceneSlow, OneVoxelOneRowAndOneColumnOfVoxels) {
+TEST_P(HardScene, OneVoxelOneRowAndOneColumnOfVoxels) {
   Scene scene = scene_of(10);
   for (const Eigen::Vector3d& size : {Eigen::Vector3d(0.02, 0.02, 0.02), Eigen::Vector3d(0.02, 0.14, 0.02),
                                       Eigen::Vector3d(0.02, 0.02, 0.14)}) {
@@ -123,7 +123,7 @@ TEST_P(HardSceneSlow, TenThousandIterationsNeitherDriftNorDiverge) {
   EXPECT_LT(error(9999), 0.7 * error(0));
 }
 
-TEST_P(HardSceneSlow, AThresholdAboveEverythingIsAnErrorThatNamesAView) {
+TEST_P(HardScene, AThresholdAboveEverythingIsAnErrorThatNamesAView) {
   SolveOptions o = options();
   o.flame_threshold = 1000;
   const Scene& scene = scene_of(10);
@@ -132,13 +132,13 @@ TEST_P(HardSceneSlow, AThresholdAboveEverythingIsAnErrorThatNamesAView) {
   EXPECT_EQ(r.where, "camera 0");
 }
 
-TEST_P(HardSceneSlow, ABlackViewIsAnErrorThatNamesIt) {
+TEST_P(HardScene, ABlackViewIsAnErrorThatNamesIt) {
   Scene scene = scene_of(10);
   scene.views[3].image = share(RadianceImage(scene.views[3].image->size));
   EXPECT_EQ(solve_on(scene, 16).error().where, "camera 3");
 }
 
-TEST_P(HardSceneSlow, NanAndInfiniteInputIsAnErrorThatNamesItsView) {
+TEST_P(HardScene, NanAndInfiniteInputIsAnErrorThatNamesItsView) {
   const auto refused = [](const std::function<void(View&)>& spoil) {
     Scene scene = scene_of(10);
     spoil(scene.views[4]);
@@ -163,13 +163,14 @@ TEST_P(HardSceneSlow, NanAndInfiniteInputIsAnErrorThatNamesItsView) {
   EXPECT_TRUE(refused([](View& v) { v.camera.intrinsics.distortion.k2 = INFINITY; }));
 }
 
-INSTANTIATE_TEST_SUITE_P(Devices, HardSceneSlow,
-                         testing::Combine(testing::ValuesIn(devices()),
-                                          testing::Values(Solver::standard, Solver::paper)),
-                         [](const auto& p) {
-                           return device_name(std::get<Device>(p.param)) +
-                                  (std::get<Solver>(p.param) == Solver::paper ? "_paper" : "_default");
-                         });
+std::string name_of_case(const testing::TestParamInfo<HardScene::ParamType>& p) {
+  return device_name(std::get<Device>(p.param)) +
+         (std::get<Solver>(p.param) == Solver::paper ? "_paper" : "_default");
+}
+const auto kHardCases =
+    testing::Combine(testing::ValuesIn(devices()), testing::Values(Solver::standard, Solver::paper));
+INSTANTIATE_TEST_SUITE_P(Devices, HardScene, kHardCases, name_of_case);
+INSTANTIATE_TEST_SUITE_P(Devices, HardSceneSlow, kHardCases, name_of_case);
 
 }  // namespace
 }  // namespace emberlock::recon

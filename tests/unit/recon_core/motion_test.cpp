@@ -83,7 +83,7 @@ TEST(MotionTestSlow, StaggeredCamerasSeeBetweenTheirInstantsAsWellAsAtThem) {
   EXPECT_LT(between, 0.7 * unaware) << "pictures of other instants as if they were of this one";
 }
 
-TEST(MotionTestSlow, APictureOfAFlameThatHasLeftTheBoxIsRefused) {
+TEST(MotionTest, APictureOfAFlameThatHasLeftTheBoxIsRefused) {
   Scene scene;
   scene.box.size = Eigen::Vector3d(0.1, 0.1, 0.3);
   for (const double late : {0.0, 0.02, -0.02}) {
@@ -98,7 +98,7 @@ TEST(MotionTestSlow, APictureOfAFlameThatHasLeftTheBoxIsRefused) {
   EXPECT_TRUE(check_carried(scene, rising(100)).ok());
 }
 
-TEST(MotionTestSlow, AMovedCameraSeesTheCarriedPointWhereItsOwnSawItLate) {
+TEST(MotionTest, AMovedCameraSeesTheCarriedPointWhereItsOwnSawItLate) {
   View view;
   view.camera =
       look_at({{64, 48}, 80, 80, 32, 24, {0.1, -0.02, 0.001, 0.002, 0}}, {0.3, 0.1, 0.05}, {0, 0, 0});
@@ -110,7 +110,7 @@ TEST(MotionTestSlow, AMovedCameraSeesTheCarriedPointWhereItsOwnSawItLate) {
             1e-9);
 }
 
-TEST(MotionTestSlow, APictureOfThePlaneThroughTheFlameChangesPlaceAsTheCameraDoes) {
+TEST(MotionTest, APictureOfThePlaneThroughTheFlameChangesPlaceAsTheCameraDoes) {
   // A smooth spot in the plane across the axis, seen from both places.
   View view;
   view.camera = look_at({{64, 48}, 80, 80, 32, 24, {}}, {0, -0.4, 0}, {0, 0, 0});
@@ -180,7 +180,7 @@ TEST(MotionTestSlow, WhatIsSetByHandIsTaken) {
 
 /// A held-out view that is late too is rendered at its own instant: what is taken out of its picture is put
 /// into the render.
-TEST(MotionTestSlow, TheSteadyPartGoesBackIntoARenderOfALateView) {
+TEST(MotionTest, TheSteadyPartGoesBackIntoARenderOfALateView) {
   const Scene& scene = rising_scene();
   Effects effects;
   effects.motion = rising(1);

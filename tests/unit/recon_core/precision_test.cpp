@@ -14,6 +14,8 @@
 namespace emberlock::recon {
 namespace {
 
+ON_EACH_DEVICE(PrecisionTest);
+
 ON_EACH_DEVICE(PrecisionTestSlow);
 
 /// The largest difference of two lists over the largest value of the second, lanes 0..lanes - 1.
@@ -28,7 +30,7 @@ double relative_difference(const std::vector<Rgba>& a, const Marches<double>::Va
   return difference / largest;
 }
 
-TEST(PrecisionSlow, PhiAndItsSlopeHoldTheirDigitsAtEveryDepth) {
+TEST(Precision, PhiAndItsSlopeHoldTheirDigitsAtEveryDepth) {
   for (double x = 1e-12; x < 1e30; x *= 1.1) {
     const auto wide = static_cast<long double>(x);
     const long double phi_true = -std::expm1(-wide) / wide;
@@ -57,7 +59,7 @@ TEST(PrecisionSlow, PhiAndItsSlopeHoldTheirDigitsAtEveryDepth) {
   EXPECT_EQ(phi_slope(0.0), -0.5);
 }
 
-TEST_P(PrecisionTestSlow, MarchesDifferByAHundredThousandthOfTheBrightest) {
+TEST_P(PrecisionTest, MarchesDifferByAHundredThousandthOfTheBrightest) {
   for (const bool curved : {false, true}) {
     const MarchCase c = march_case({.curved = curved});
     const auto narrow = marches_on<float>(device_here(), c.list);
@@ -79,7 +81,7 @@ TEST_P(PrecisionTestSlow, MarchesDifferByAHundredThousandthOfTheBrightest) {
   }
 }
 
-TEST_P(PrecisionTestSlow, TransmittanceIsRightToMillionthsHoweverThickTheMedium) {
+TEST_P(PrecisionTest, TransmittanceIsRightToMillionthsHoweverThickTheMedium) {
   const MarchCase c = march_case();
   for (double sigma = 1e-6; sigma < 1e9; sigma *= 10) {
     const auto x = random_quads<float>(c.list.grid.size(), 1, 1, 2 * sigma);
@@ -90,7 +92,7 @@ TEST_P(PrecisionTestSlow, TransmittanceIsRightToMillionthsHoweverThickTheMedium)
   }
 }
 
-TEST_P(PrecisionTestSlow, GradientsByEmissionAndExtinctionDifferByAHundredThousandthOfTheLargest) {
+TEST_P(PrecisionTest, GradientsByEmissionAndExtinctionDifferByAHundredThousandthOfTheLargest) {
   const MarchCase c = march_case();
   const auto seen = random_quads<float>(c.list.rays.size(), 1, 2);
   const auto background = random_quads<float>(c.list.rays.size(), 2);

@@ -17,6 +17,8 @@
 namespace emberlock::recon {
 namespace {
 
+ON_EACH_DEVICE(SolveEffects);
+
 ON_EACH_DEVICE(SolveEffectsSlow);
 
 constexpr PerMeter kExtinction{32.8};
@@ -164,7 +166,7 @@ TEST_P(SolveEffectsSlow, LightScatteredForwardsIsToldFromLightThatShinesEvenly) 
   EXPECT_LT(error(0.8), error(0));
 }
 
-TEST_P(SolveEffectsSlow, ThePapersSolverRefusesWhatItDoesNotKnow) {
+TEST_P(SolveEffects, ThePapersSolverRefusesWhatItDoesNotKnow) {
   const Scene scene = filmed({});
   Effects effects;
   effects.extinction.model = Extinction::Model::field;

@@ -182,7 +182,7 @@ TEST(LightChoiceSlow, WithoutTimeToCompareNothingIsBelieved) {
   EXPECT_THAT(cut.reason, Not(HasSubstr("inf")));
 }
 
-TEST(LightChoiceSlow, OfALightByHandNothingIsSaidThatWasNotTried) {
+TEST(LightChoice, OfALightByHandNothingIsSaidThatWasNotTried) {
   LightSearch search;
   EffectRequest request;
   request.fixed = under_light(light_at(Source::distant, {1, -0.5, 0.4}));

@@ -69,7 +69,7 @@ TEST(PreparedSceneTestSlow, ACameraThatIsPutRightCostsNoPictures) {
 }
 
 // What is measured along the borders is light, as the background of a render is.
-TEST(PreparedSceneTestSlow, AGreyBackgroundBehindAGammaIsKnownInLinearLevels) {
+TEST(PreparedSceneTest, AGreyBackgroundBehindAGammaIsKnownInLinearLevels) {
   Scene scene = scene_of_a_ball();
   const Effects bent = a_gamma();
   for (View& view : scene.views) {
@@ -86,7 +86,7 @@ TEST(PreparedSceneTestSlow, AGreyBackgroundBehindAGammaIsKnownInLinearLevels) {
   for (const double level : found.radiance) EXPECT_NEAR(level, 12, 0.5);
 }
 
-TEST(PreparedSceneTestSlow, MasksAreFoundOnceForTheSamePicturesAndBackground) {
+TEST(PreparedSceneTest, MasksAreFoundOnceForTheSamePicturesAndBackground) {
   const auto prepared = value_of(PreparedScene::create(scene_of_a_ball(), {}));
   const SharedMasks masks = prepared.masks({}, {});
   Effects other;
@@ -100,7 +100,7 @@ TEST(PreparedSceneTestSlow, MasksAreFoundOnceForTheSamePicturesAndBackground) {
   EXPECT_EQ(prepared.masks({}, {}), masks);
 }
 
-TEST(PreparedSceneTestSlow, WhatDoesNotChangeAPictureSharesIt) {
+TEST(PreparedSceneTest, WhatDoesNotChangeAPictureSharesIt) {
   const Scene told = scene_of_a_ball();
   const auto prepared = value_of(PreparedScene::create(told, a_gamma()));
   const SharedImage linear = prepared.scene().views[1].image;
@@ -121,7 +121,7 @@ TEST(PreparedSceneTestSlow, WhatDoesNotChangeAPictureSharesIt) {
   EXPECT_EQ(turned.told().views[1].camera.intrinsics.cx, cameras[1].intrinsics.cx);
 }
 
-TEST(PreparedSceneTestSlow, OnlyLateViewsWhoseAverageIsKnownGetOtherPictures) {
+TEST(PreparedSceneTest, OnlyLateViewsWhoseAverageIsKnownGetOtherPictures) {
   Scene told = scene_of_a_ball();
   for (View& view : told.views) view.average = view.image;
   told.views[2].lateness = Seconds(0.004);
@@ -139,7 +139,7 @@ TEST(PreparedSceneTestSlow, OnlyLateViewsWhoseAverageIsKnownGetOtherPictures) {
   EXPECT_EQ(prepared.under(moved).scene().views[2].image, views[2].image) << "done before";
 }
 
-TEST(PreparedSceneTestSlow, ASceneThatNobodyCanUseIsNotPrepared) {
+TEST(PreparedSceneTest, ASceneThatNobodyCanUseIsNotPrepared) {
   Scene scene = scene_of_a_ball();
   scene.views[4].image.reset();
   EXPECT_EQ(PreparedScene::create(scene, {}).error().where, "camera 4");

@@ -52,7 +52,7 @@ PlacedResult flame_of(Fields& fields, const fs::path& folder) {
 }
 
 CameraPlan::Stop stop_of(Fields& fields, const Eigen::Vector3d& up, const std::string& key) {
-  const CameraPlan::Stop stop{fields.place("from"), fields.place("look_at")};
+  CameraPlan::Stop stop{fields.place("from"), fields.place("look_at")};
   const Eigen::Vector3d along = stop.at - stop.from;
   if (!(along.cross(up).norm() > 1e-6 * along.norm()))
     refuse("looks along the axis that is up, or at itself", key, "Give another place, look_at or up");

@@ -16,7 +16,7 @@ inline constexpr int kMostFlames = 64;  ///< of a scene
 
 /// A part of a ray, metres; lanes 0..2 the source, grey levels per metre, lane 3 the extinction, 1/m.
 struct RayStep {
-  float from, to;
+  float from = 0, to = 0;
   recon::Rgba shine;
 };
 

@@ -62,8 +62,8 @@ struct TrackStep {
 /// Poses as frames come.
 class PoseTrack {
  public:
-  explicit PoseTrack(recon::Intrinsics lens, const TrackOptions& options = {})
-      : lens_(std::move(lens)), options_(options), noise_(options.pixel_sigma * options.pixel_sigma) {}
+  explicit PoseTrack(const recon::Intrinsics& lens, const TrackOptions& options = {})
+      : lens_(lens), options_(options), noise_(options.pixel_sigma * options.pixel_sigma) {}
   /// The next frame, later than the one before; `points` is empty where the marker isn't seen.
   TrackStep see(Seconds time, const std::vector<MarkerPoint>& points);
 

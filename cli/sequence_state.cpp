@@ -35,7 +35,7 @@ std::optional<ListedFile> listed_volume(const fs::path& folder) {
 }  // namespace
 
 std::string value_of(const Option& option) {
-  const std::string value = fmt::format("{}", fmt::join(option.values(), ","));
+  std::string value = fmt::format("{}", fmt::join(option.values(), ","));
   if (option.name() != "--out" && !options_of_files().contains(option.name())) return value;
   std::error_code ec;
   return fs::absolute(value, ec).lexically_normal().string();

@@ -23,9 +23,9 @@ namespace fs = std::filesystem;
 using testing::HasSubstr;
 using Live = v1::LiveStatus;
 
-class LiveVolumesProgramTest : public testing::Test {
+class LiveVolumesProgramTestSlow : public testing::Test {
  protected:
-  LiveVolumesProgramTest() {
+  LiveVolumesProgramTestSlow() {
     config_.rig.name = "small";
     rig::CameraConfig cameras;
     cameras.count = 4;
@@ -123,7 +123,7 @@ class LiveVolumesProgramTest : public testing::Test {
   std::unique_ptr<daemon::Engine> engine_;
 };
 
-TEST_F(LiveVolumesProgramTest, VolumesComeWhileItIsRecordedAndCostItNothing) {
+TEST_F(LiveVolumesProgramTestSlow, VolumesComeWhileItIsRecordedAndCostItNothing) {
   start();
   ASSERT_TRUE(engine_->record(take("without", {})).ok());
   ASSERT_TRUE(test::wait_until([&] { return board_.status()->recording().frames() > 60; }));
@@ -151,7 +151,7 @@ TEST_F(LiveVolumesProgramTest, VolumesComeWhileItIsRecordedAndCostItNothing) {
   EXPECT_TRUE(test::wait_until([] { return child() == 0; })) << "the process is gone";
 }
 
-TEST_F(LiveVolumesProgramTest, OneThatCannotKeepUpIsOvertakenAndSaysWhatWouldHold) {
+TEST_F(LiveVolumesProgramTestSlow, OneThatCannotKeepUpIsOvertakenAndSaysWhatWouldHold) {
   start();
   record_until(live(1, 64),
                [](const Live& now) { return now.volumes() >= 2 && !now.keeps_up() && now.skipped() > 0; });
@@ -164,7 +164,7 @@ TEST_F(LiveVolumesProgramTest, OneThatCannotKeepUpIsOvertakenAndSaysWhatWouldHol
   stop_recording();
 }
 
-TEST_F(LiveVolumesProgramTest, AChildThatIsKilledIsToldAndTheRecordingGoesOn) {
+TEST_F(LiveVolumesProgramTestSlow, AChildThatIsKilledIsToldAndTheRecordingGoesOn) {
   start();
   pid_t pid = 0;
   record_until(live(2, 16), [&](const Live& now) { return now.volumes() >= 1 && (pid = child()) > 0; });
@@ -177,7 +177,7 @@ TEST_F(LiveVolumesProgramTest, AChildThatIsKilledIsToldAndTheRecordingGoesOn) {
   stop_recording();
 }
 
-TEST_F(LiveVolumesProgramTest, WithoutACalibrationOrOutOfRangeNothingBegins) {
+TEST_F(LiveVolumesProgramTestSlow, WithoutACalibrationOrOutOfRangeNothingBegins) {
   config_.rig.virtual_rig.scene = rig::VirtualConfig::Scene::dark_room;
   start();
   const auto refused = engine_->record(take("take", live()));

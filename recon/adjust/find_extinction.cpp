@@ -113,17 +113,16 @@ double vertex(const std::array<double, 3>& x, const std::array<double, 3>& error
   return std::clamp(0.5 * (x[0] + x[1]) - 0.5 * ab / curvature, x[0], x[2]);
 }
 
-/// Doubles the depth from the thinnest until the error has clearly risen, at most to the thickest, then tries
-/// the vertex of the parabola around the best.
+/// Doubles the depth until the error has clearly risen, then tries the vertex of the parabola around the
+/// best.
 template <class Late>
-std::vector<ScoredExtinction> search_depth(const Probe& probe, double soot, double thinnest, double thickest,
-                                           const Late& late) {
+std::vector<ScoredExtinction> search_depth(const Probe& probe, double soot, const Late& late) {
   constexpr double kClearly = 1.1;  // of nearly equal depths errors don't rise and fall smoothly
   const double chord = probe.mean_chord().value();
   const auto attempt = [&](double depth) { return probe.score(guess(PerMeter(depth / chord), soot)); };
   std::vector<ScoredExtinction> tried;
   double least = std::numeric_limits<double>::infinity();
-  for (double depth = thinnest; depth <= thickest && !late(); depth *= 2) {
+  for (double depth = kThinnest; depth <= kThickest && !late(); depth *= 2) {
     tried.push_back(attempt(depth));
     least = std::min(least, tried.back().error);
     if (tried.back().error > kClearly * least) break;
@@ -132,7 +131,7 @@ std::vector<ScoredExtinction> search_depth(const Probe& probe, double soot, doub
   const auto at = static_cast<std::size_t>(best - tried.begin());
   if (at == 0 || at + 1 >= tried.size() || late()) return tried;
   const double octave = vertex({-1.0, 0.0, 1.0}, {tried[at - 1].error, tried[at].error, tried[at + 1].error});
-  tried.push_back(attempt(thinnest * std::exp2(static_cast<double>(at) + octave)));
+  tried.push_back(attempt(kThinnest * std::exp2(static_cast<double>(at) + octave)));
   return tried;
 }
 
@@ -195,16 +194,13 @@ EstimatedExtinction find_extinction(const SolverSetup& probing, bool forced, con
   std::vector<ScoredExtinction> candidates;
   const ScoredExtinction none = probe.score({});
   if (!forced) candidates.push_back(none);  // stays the best among equals
-  std::vector<ScoredExtinction> mixed = search_depth(probe, 0.5, kThinnest, kThickest, late);
-  const auto best_mixed = std::min_element(mixed.begin(), mixed.end(), scores_better);
-  // Where a mixture doesn't lower the error, neither of its parts does.
-  if (best_mixed != mixed.end() && (forced || scores_better(*best_mixed, none))) {
-    const double depth = mean_extinction(best_mixed->extinction) * probe.mean_chord().value();
+  const std::vector<ScoredExtinction> mixed = search_depth(probe, 0.5, late);
+  // Where no mixture lowers the error, neither of its parts does.
+  if (forced || std::any_of(mixed.begin(), mixed.end(),
+                            [&](const ScoredExtinction& c) { return scores_better(c, none); })) {
     std::array<std::vector<ScoredExtinction>, 2> pure;
-    at_once(probing.pool, 2, [&](int soot) {
-      pure[static_cast<std::size_t>(soot)] =
-          search_depth(probe, soot, std::max(kThinnest, depth / 2), std::min(kThickest, depth * 2), late);
-    });
+    at_once(probing.pool, 2,
+            [&](int soot) { pure[static_cast<std::size_t>(soot)] = search_depth(probe, soot, late); });
     for (const auto& tried : pure) candidates.insert(candidates.end(), tried.begin(), tried.end());
   }
   candidates.insert(candidates.end(), mixed.begin(), mixed.end());

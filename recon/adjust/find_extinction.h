@@ -28,8 +28,8 @@ struct EstimatedExtinction {
 /// from a wrong scale doesn't recover, so this is a global search by cross-validation (Stone 1974): solves on
 /// the hull of `probing` (of carve_probe()), each by as many steps from zero, judged on pixels and on views
 /// that are left out of the fit. The candidates are no extinction, unless `forced`, and for each distribution
-/// optical depths that double along the mean ray; uniform and soot-like ones only around the best mixture of
-/// both, if that lowers the error.
+/// optical depths that double along the mean ray; uniform and soot-like ones only if a mixture of both lowers
+/// the error.
 ///
 /// With a budget, the search ends when it has used a third of it.
 EstimatedExtinction find_extinction(const SolverSetup& probing, bool forced, const Elapsed& elapsed = {});

@@ -83,6 +83,8 @@ TEST_F(V4l2Again, AllComeBackEachTimeThatTheyAreUnpluggedWithoutALeak) {
   }
   const auto longest_report = *std::max_element(reports.begin(), reports.end());
   const auto longest_return = *std::max_element(returns.begin(), returns.end());
+  // A camera that has just come back may still be looking at its device.
+  static_cast<void>(test::wait_until([&] { return open_descriptors() <= descriptors; }));
   const int more_descriptors = open_descriptors() - descriptors;
   const long more_memory = heap_kilobytes() - memory;
   std::printf(
@@ -93,7 +95,7 @@ TEST_F(V4l2Again, AllComeBackEachTimeThatTheyAreUnpluggedWithoutALeak) {
       rounds, 1e3 * quantile(reports, 0.5), 1e3 * longest_report, 1e3 * quantile(returns, 0.5),
       1e3 * longest_return, more_descriptors, more_memory, kWarmUp);
   if (rounds <= kWarmUp) return;
-  EXPECT_EQ(more_descriptors, 0);
+  EXPECT_LE(more_descriptors, 0);
   // One leaked picture of each camera and round would be twice that; two of each may wait in the queues.
   EXPECT_LE(more_memory, 225L * std::max(rounds - kWarmUp, 4));
 }

@@ -17,6 +17,7 @@
 #include "drivers/v4l2/device.h"
 #include "drivers/v4l2/nodes.h"
 #include "drivers/v4l2/v4l2.h"
+#include "tests/support/wait.h"
 
 namespace emberlock {
 
@@ -67,8 +68,10 @@ class Vivid : public testing::Test {
     file << "vivid.0" << std::flush;
     ASSERT_TRUE(file.good()) << what << " failed";
   }
-  /// Until udevd has closed them again.
-  static void settle() { ASSERT_EQ(std::system("udevadm settle"), 0); }
+  /// Waits until udevd has closed them again. udevd may close the connection on which settle waits.
+  static void settle() {
+    ASSERT_TRUE(test::wait_until([] { return std::system("udevadm settle") == 0; }));
+  }
   static int there() {
     int n = 0;
     for (const drivers::VideoNode& node : drivers::list_video_nodes())

@@ -9,8 +9,7 @@ namespace emberlock::recon {
 
 /// A hull of about 4000 voxels over the medium's own bounds, whatever grid a run asks for, so that a choice
 /// made on it doesn't depend on that grid. It is coarser where the pictures of `setup.views` don't resolve
-/// that many. Errors: those of carve().
-/// `refinement` times as many voxels along each side.
+/// that many. `refinement` multiplies the number of voxels along each side. Errors: those of carve().
 Result<Hull> carve_probe(const SolverSetup& setup, const Scene& linear, const std::vector<FlameMask>& masks,
                          double refinement = 1);
 

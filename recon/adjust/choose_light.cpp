@@ -71,15 +71,23 @@ LightChoice choose_light(const SolverSetup& setup, const Extinction& otherwise, 
   if (found.light.source == Source::even)
     return off(explain_light(found) +
                ": no shade tells that from an even glow, so only light=even takes it for light");
-  SolverSetup lit = setup;
-  lit.effects.light = found.light;
   const FoundSmoothness without = find_smoothness(free, otherwise, late);
-  const FoundSmoothness with = find_smoothness(LeftOutViews(lit, setup.hull), expected(found), late);
+  const auto shown_under = [&](const FoundLight& light) {
+    SolverSetup lit = setup;
+    lit.effects.light = light.light;
+    return find_smoothness(LeftOutViews(lit, setup.hull), expected(light), late);
+  };
+  FoundSmoothness with = shown_under(found);
+  // A rough direction is some 20 degrees off, so one that comes near is refined before it is judged.
+  if (with.error < (1 + kLeastGainOfLight) * without.error && !late()) {
+    found = refine_light(setup, found, elapsed);
+    const FoundSmoothness closer = shown_under(found);
+    if (std::isfinite(closer.error)) with = closer;
+  }
   if (!std::isfinite(with.error) || !std::isfinite(without.error))
     return off(explain_light(found) + (late() ? "; there was no time to compare that with a medium that glows"
                                               : "; fits without some of the views diverged"));
   const bool believed = with.error < (1 - kLeastGainOfLight) * without.error;
-  if (believed) found = refine_light(setup, found, elapsed);
   const std::string shown = fmt::format(
       "{}; views that are left out of the fit are shown to {:.3g} grey levels so, and to {:.3g} by "
       "a medium that glows",

@@ -52,7 +52,7 @@ Conductor::Conductor(const ConductorParts& parts, rig::StopAsked stop, const rig
     if (const Status started = camera->start(); !started.ok())
       parts_.board.notice(v1::AMBER, started.error().message());
   }
-  strobe_status_ = strobe().ok() ? Status{} : strobe_status_;
+  if (devices_.strobe != nullptr) static_cast<void>(know_strobe(devices_.strobe->read_back()));
   set_scene();
 }
 
@@ -79,37 +79,65 @@ Status Conductor::acknowledge(const v1::AcknowledgeRequest& request) {
   return happen(AskAcknowledge{request.fault_id()});
 }
 
-Result<v1::StrobeState> Conductor::strobe() {
-  drivers::Strobe* strobe = devices_.strobe;
-  if (strobe == nullptr)
-    return Error{ErrorKind::refused, "the rig has no strobe", "[rig.strobe]", "Configure one"};
-  const Result<drivers::StrobeSettings> said = strobe->read_back();
-  strobe_status_ = said.ok() ? Status{} : Status(said.error());
-  for (const MachineEvent& event : watch_.strobe(strobe->id(), strobe_status_))
-    static_cast<void>(happen(event));
-  if (!said.ok()) return said.error();
-  strobe_settings_ = *said;
-  return drivers::strobe_event(parts_.rig.clock().now(), *said).strobe();
+Status Conductor::check_strobe() const {
+  if (devices_.strobe != nullptr) return {};
+  return Error{ErrorKind::refused, "the rig has no strobe", "[rig.strobe]", "Configure one"};
 }
 
-Result<v1::StrobeState> Conductor::apply_strobe(const v1::StrobeState& wanted) {
-  EMBERLOCK_RETURN_IF_ERROR(check_not_lent());
-  if (state_.phase != v1::IDLE && state_.phase != v1::CAPTURING) {
-    return state_.phase == v1::FINISHING
-               ? Error{ErrorKind::refused, "a recording is being finished", "strobe", "Ask again in a moment"}
-               : Error{ErrorKind::refused, "the alignment has the strobe", "strobe",
-                       "Stop the alignment first"};
+Result<v1::StrobeState> Conductor::know_strobe(const Result<drivers::StrobeSettings>& settings) {
+  strobe_status_ = settings.ok() ? Status{} : Status(settings.error());
+  for (const MachineEvent& event : watch_.strobe(devices_.strobe->id(), strobe_status_))
+    static_cast<void>(happen(event));
+  if (!settings.ok()) return settings.error();
+  strobe_settings_ = *settings;
+  return drivers::strobe_event(parts_.rig.clock().now(), *settings).strobe();
+}
+
+void Conductor::read_strobe(StrobeAnswer answer) {
+  if (const Status exists = check_strobe(); !exists.ok()) return answer(exists.error());
+  call_strobe(std::nullopt, std::move(answer));
+}
+
+void Conductor::apply_strobe(const v1::StrobeState& wanted, StrobeAnswer answer) {
+  const auto possible = [&]() -> Result<drivers::StrobeSettings> {
+    EMBERLOCK_RETURN_IF_ERROR(check_not_lent());
+    if (state_.phase != v1::IDLE && state_.phase != v1::CAPTURING) {
+      return state_.phase == v1::FINISHING ? Error{ErrorKind::refused, "a recording is being finished",
+                                                   "strobe", "Ask again in a moment"}
+                                           : Error{ErrorKind::refused, "the alignment has the strobe",
+                                                   "strobe", "Stop the alignment first"};
+    }
+    EMBERLOCK_RETURN_IF_ERROR(check_strobe());
+    return drivers::strobe_settings(wanted);
+  }();
+  if (!possible.ok()) return answer(possible.error());
+  call_strobe(*possible, std::move(answer));
+}
+
+void Conductor::call_strobe(std::optional<drivers::StrobeSettings> wanted, StrobeAnswer answer) {
+  const bool applies = wanted.has_value();
+  strobe_calls_.push_back({parts_.rig.ask_strobe(std::move(wanted)), applies, std::move(answer)});
+  take_strobe_answers();
+}
+
+void Conductor::take_strobe_answers() {
+  while (!strobe_calls_.empty() &&
+         strobe_calls_.front().settings.wait_for(std::chrono::seconds(0)) != std::future_status::timeout) {
+    StrobeCall call = std::move(strobe_calls_.front());
+    strobe_calls_.pop_front();
+    Result<v1::StrobeState> state = know_strobe(call.settings.get());
+    if (state.ok() && call.applies && recorder_ && !finishing_) {
+      const Status kept =
+          recorder_->append(drivers::strobe_event(parts_.rig.clock().now(), strobe_settings_));
+      if (!kept.ok()) state = kept.error();
+    }
+    call.answer(std::move(state));
   }
-  drivers::Strobe* strobe = devices_.strobe;
-  if (strobe == nullptr)
-    return Error{ErrorKind::refused, "the rig has no strobe", "[rig.strobe]", "Configure one"};
-  EMBERLOCK_ASSIGN_OR_RETURN(const drivers::StrobeSettings settings, drivers::strobe_settings(wanted));
-  EMBERLOCK_RETURN_IF_ERROR(strobe->apply(settings));
-  EMBERLOCK_ASSIGN_OR_RETURN(const v1::StrobeState state, this->strobe());
-  if (recorder_)
-    EMBERLOCK_RETURN_IF_ERROR(
-        recorder_->append(drivers::strobe_event(parts_.rig.clock().now(), strobe_settings_)));
-  return state;
+}
+
+void Conductor::await_strobe() {
+  for (const StrobeCall& call : strobe_calls_) call.settings.wait();
+  take_strobe_answers();
 }
 
 Status Conductor::happen(const MachineEvent& event) {
@@ -206,11 +234,11 @@ void Conductor::watch_devices() {
       break_alignment(Why::camera_away);
     }
   }
-  // Waiting for one that is silent would cost frames of a recording.
-  if (!recorder_ && !strobe_status_.ok() && devices_.strobe != nullptr &&
+  take_strobe_answers();
+  if (!strobe_status_.ok() && strobe_calls_.empty() &&
       (!strobe_asked_ || now - *strobe_asked_ >= kStrobeInterval)) {
     strobe_asked_ = now;
-    static_cast<void>(strobe());
+    read_strobe([](const Result<v1::StrobeState>&) {});
   }
 }
 

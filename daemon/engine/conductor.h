@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <deque>
 #include <functional>
+#include <future>
 #include <memory>
 #include <optional>
 #include <string>
@@ -65,8 +66,11 @@ class Conductor {
   Status reconstruct(const v1::ReconstructRequest& request);
   Status cancel_reconstruction();
   Status acknowledge(const v1::AcknowledgeRequest& request);
-  Result<v1::StrobeState> strobe();
-  Result<v1::StrobeState> apply_strobe(const v1::StrobeState& wanted);
+  using StrobeAnswer = std::function<void(Result<v1::StrobeState>)>;
+  /// The strobe may take seconds: `answer` is called by work() then, or at once. It isn't if the conductor
+  /// ends before.
+  void read_strobe(StrobeAnswer answer);
+  void apply_strobe(const v1::StrobeState& wanted, StrobeAnswer answer);
 
   // What a leading host asks for (hosts.proto).
   Result<v1::LentCameras> lend(const Borrower& leader);
@@ -96,7 +100,21 @@ class Conductor {
   [[nodiscard]] v1::DaemonStatus status() const;
 
  private:
+  /// What the strobe was asked for, and its settings after that once it has answered.
+  struct StrobeCall {
+    std::future<Result<drivers::StrobeSettings>> settings;
+    bool applies = false;
+    StrobeAnswer answer;
+  };
+
   Status happen(const MachineEvent& event);
+  [[nodiscard]] Status check_strobe() const;
+  void call_strobe(std::optional<drivers::StrobeSettings> wanted, StrobeAnswer answer);
+  void take_strobe_answers();
+  /// Until nobody else's call is under way.
+  void await_strobe();
+  /// What a call brought becomes what is known of the strobe.
+  Result<v1::StrobeState> know_strobe(const Result<drivers::StrobeSettings>& settings);
   Status renew(const v1::AlignRequest& request);
   /// How long a take may be that begins now.
   [[nodiscard]] TakeLength take_length(Seconds asked) const;
@@ -105,6 +123,7 @@ class Conductor {
   [[nodiscard]] bool records_strobe() const { return record_request_.purpose() == "alignment"; }
   Status light_strobe();
   void darken_strobe();
+  void darken_after_recording();
   void note(const Remark& remark);
   void carry_out(Action action);
   void begin_alignment();
@@ -219,6 +238,7 @@ class Conductor {
   drivers::StrobeSettings strobe_settings_;
   Status strobe_status_;  ///< of its last answer
   std::optional<TimePoint> strobe_asked_;
+  std::deque<StrobeCall> strobe_calls_;  ///< unanswered
   v1::StorageStatus storage_;
   std::optional<TimePoint> disk_looked_;
   TimePoint began_;

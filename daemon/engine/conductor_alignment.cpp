@@ -116,6 +116,7 @@ LockLeft Conductor::lock_left() const {
 Status Conductor::stop_sync() { return happen(AskIdle{}); }
 
 void Conductor::begin_alignment() {
+  await_strobe();
   alignment_.reset();
   history_.clear();
   foretold_.reset();
@@ -139,10 +140,7 @@ void Conductor::end_alignment() {
   }
   alignment_.reset();
   if (devices_.strobe->dial()) return;  // somebody switches it off
-  v1::StrobeState off = drivers::strobe_event({}, strobe_settings_).strobe();
-  off.set_output(v1::StrobeState::OFF);
-  if (const auto applied = apply_strobe(off); !applied.ok())
-    parts_.board.notice(v1::AMBER, applied.error().message());
+  darken_strobe();
 }
 
 void Conductor::measure_row_time() {
@@ -189,7 +187,7 @@ void Conductor::explain_failure(const Error& error) {
   watch_devices();
   if (!alignment_) return;
   if (!watch_.all_film()) return break_alignment(Why::camera_away);
-  if (!strobe().ok()) return break_alignment(Why::strobe_away);
+  if (!know_strobe(devices_.strobe->read_back()).ok()) return break_alignment(Why::strobe_away);
   static_cast<void>(happen(RoundDone{v1::AlignmentStatus::GIVEN_UP, error}));
 }
 

@@ -82,16 +82,16 @@ Status Conductor::begin_take(const v1::RecordRequest& request, const std::filesy
 Status Conductor::stop_recording() { return happen(AskStopRecording{}); }
 
 void Conductor::begin_recording() {
+  const bool must_be_dark = state_.lock == Lock::held && !records_strobe();
+  // Before the first frame that is recorded: a silent strobe takes seconds.
+  const Status set = records_strobe() ? light_strobe() : must_be_dark ? alignment_->darken() : Status{};
+  if (!set.ok()) parts_.board.notice(v1::AMBER, set.error().message());
   const TimePoint now = parts_.rig.clock().now();
   record_began_ = part_ ? TimePoint{part_->from_ns()} : now;
   spread_.reset();
   if (state_.lock == Lock::held) spread_ = alignment_->worst_pair(now);
-  if (records_strobe()) {
-    if (const Status lit = light_strobe(); !lit.ok()) parts_.board.notice(v1::AMBER, lit.error().message());
-  } else if (state_.lock == Lock::held) {
+  if (must_be_dark) {
     // A flash that was under way may show in the two frames that follow.
-    if (const Status dark = alignment_->darken(); !dark.ok())
-      parts_.board.notice(v1::AMBER, dark.error().message());
     if (devices_.strobe->dial()) note({v1::AMBER, Remark::Code::flashes_show});
     Seconds transport;
     for (const drivers::Camera* camera : devices_.cameras)
@@ -110,7 +110,7 @@ void Conductor::begin_recording() {
   if (!recorder.ok()) {
     part_.reset();
     parts_.jobs.resume();
-    darken_strobe();
+    darken_after_recording();
     begun_ = recorder.error();
     static_cast<void>(happen(RecordingRefused{recorder.error()}));
     return;
@@ -167,6 +167,7 @@ void Conductor::feed_live() {
 Status Conductor::light_strobe() {
   drivers::Strobe* strobe = devices_.strobe;
   if (strobe == nullptr || strobe->dial()) return {};
+  await_strobe();
   if (alignment_) return alignment_->light();
   if (strobe_settings_.output == drivers::StrobeOutput::flashing) return {};
   const Hertz rate = devices_.cameras.front()->info().frame_rate;
@@ -179,13 +180,17 @@ Status Conductor::light_strobe() {
 }
 
 /// The strobe, if it flashed for a recording alone.
+void Conductor::darken_after_recording() {
+  if (std::exchange(lit_for_recording_, false)) darken_strobe();
+}
+
 void Conductor::darken_strobe() {
-  if (!std::exchange(lit_for_recording_, false)) return;
+  await_strobe();
   drivers::StrobeSettings dark = strobe_settings_;
   dark.output = drivers::StrobeOutput::off;
   if (const Status off = devices_.strobe->apply(dark); !off.ok())
     parts_.board.notice(v1::AMBER, off.error().message());
-  static_cast<void>(strobe());
+  static_cast<void>(know_strobe(devices_.strobe->read_back()));
 }
 
 /// work() takes what is still on its way and finishes, so that whoever asked needn't wait.
@@ -211,7 +216,6 @@ bool Conductor::all_have_come() const {
 
 /// A job: queues drain to the disk, and segments are flushed.
 void Conductor::begin_finishing() {
-  darken_strobe();
   finished_ = std::make_shared<v1::RecordingStatus>();
   const auto finish = [recorder = recorder_.get(), finished = finished_, after = own_counts(),
                        now = parts_.rig.clock().now(), folder = record_folder_,
@@ -226,6 +230,7 @@ void Conductor::begin_finishing() {
   };
   auto job = parts_.jobs.add({v1::Job::FINISH, state_.session, finish});
   finishing_ = std::move(*job);  // no bound refuses it
+  darken_after_recording();
 }
 
 /// A slice of it.

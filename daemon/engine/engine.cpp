@@ -235,12 +235,14 @@ Status Engine::acknowledge(const v1::AcknowledgeRequest& request) {
 Result<v1::ListDevicesResponse> Engine::list_devices() { return to_proto(rig::list_devices()); }
 
 Result<v1::StrobeState> Engine::strobe() {
-  return on_thread<Result<v1::StrobeState>>(Urgency::waits, [](Conductor& c) { return c.strobe(); });
+  return until_done<Result<v1::StrobeState>>(
+      Urgency::waits, [](Conductor& c, Conductor::StrobeAnswer done) { c.read_strobe(std::move(done)); });
 }
 
 Result<v1::StrobeState> Engine::apply_strobe(const v1::StrobeState& wanted) {
-  return on_thread<Result<v1::StrobeState>>(Urgency::waits,
-                                            [wanted](Conductor& c) { return c.apply_strobe(wanted); });
+  return until_done<Result<v1::StrobeState>>(
+      Urgency::waits,
+      [wanted](Conductor& c, Conductor::StrobeAnswer done) { c.apply_strobe(wanted, std::move(done)); });
 }
 
 Status Engine::align(const v1::AlignRequest& request) {
@@ -354,13 +356,19 @@ Result<v1::StylizationStatus> Engine::edit_reconstruction(const v1::EditRequest&
 Result<v1::ReconstructionStatus> Engine::finish_reconstruction() { return reconstruction_.finish(); }
 
 Result<v1::ArStatus> Engine::start_ar(const v1::ArRequest& request) {
+  EMBERLOCK_ASSIGN_OR_RETURN(const ArCamera camera,
+                             on_thread<Result<ArCamera>>(Urgency::waits, [this, request](Conductor&) {
+                               return ar_camera(request.camera_id());
+                             }));
+  return ar_->start(request, camera);
+}
+
+Result<ArCamera> Engine::ar_camera(const std::string& id) {
   for (std::size_t i = 0; i < rig_->size(); ++i) {
     const drivers::CameraInfo& info = rig_->camera(i).info();
-    if (info.id == request.camera_id())
-      return ar_->start(request, {info.id, info.layout, geometry_.calibration_of(info.id)});
+    if (info.id == id) return ArCamera{info.id, info.layout, geometry_.calibration_of(info.id)};
   }
-  return Error{ErrorKind::bad_input, "the rig has no such camera", request.camera_id(),
-               "Name one of the status' cameras"};
+  return Error{ErrorKind::bad_input, "the rig has no such camera", id, "Name one of the status' cameras"};
 }
 
 std::shared_ptr<const v1::IterationPreview> Engine::reconstructed_frame(const v1::FrameRequest& request) {

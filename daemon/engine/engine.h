@@ -106,10 +106,15 @@ class Engine final : public Api, public Lender {
   void run();
   void show(const Conductor& conductor);
   void refuse_calls();
-  /// Has it done on the thread, and waits for that.
+  /// On the thread: a camera's layout changes as it comes back.
+  Result<ArCamera> ar_camera(const std::string& id);
   void post(std::function<void(Conductor&)> call);
+  /// Has it done on the thread, and waits for that.
   template <class Answer>
   Answer on_thread(Urgency urgency, std::function<Answer(Conductor&)> call);
+  /// Has it begun on the thread, and waits until it calls `done`, on the thread too.
+  template <class Answer>
+  Answer until_done(Urgency urgency, std::function<void(Conductor&, std::function<void(Answer)> done)> begin);
 
   const rig::DaemonConfig config_;
   Board& board_;
@@ -144,22 +149,31 @@ class Engine final : public Api, public Lender {
 };
 
 template <class Answer>
-Answer Engine::on_thread(Urgency urgency, std::function<Answer(Conductor&)> call) {
+Answer Engine::until_done(Urgency urgency,
+                          std::function<void(Conductor&, std::function<void(Answer)> done)> begin) {
   auto promise = std::make_shared<std::promise<Answer>>();
   std::future<Answer> answer = promise->get_future();
   const bool urgent = urgency == Urgency::interrupts;
   if (urgent) ++urgent_;
-  post([this, urgent, promise = std::move(promise), call = std::move(call)](Conductor& conductor) {
+  post([this, urgent, promise = std::move(promise), begin = std::move(begin)](Conductor& conductor) {
     if (urgent) --urgent_;
-    Answer made = call(conductor);
-    show(conductor);  // whoever has the answer finds in the status what it did, however long the round lasts
-    promise->set_value(std::move(made));
+    begin(conductor, [this, promise, &conductor](Answer made) {
+      show(
+          conductor);  // whoever has the answer finds in the status what it did, however long the round lasts
+      promise->set_value(std::move(made));
+    });
   });
   try {
     return answer.get();
   } catch (const std::future_error&) {
     return Error{ErrorKind::refused, "it is shutting down", "emberlockd", "Start it again"};
   }
+}
+
+template <class Answer>
+Answer Engine::on_thread(Urgency urgency, std::function<Answer(Conductor&)> call) {
+  return until_done<Answer>(
+      urgency, [call = std::move(call)](Conductor& conductor, const auto& done) { done(call(conductor)); });
 }
 
 }  // namespace emberlock::daemon

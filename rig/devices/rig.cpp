@@ -135,24 +135,25 @@ Status Rig::open_strobe(const RigConfig& config) {
         return refuse("a virtual strobe lights virtual cameras alone", "rig.strobe",
                       "add a virtual camera, or say another driver");
       }
-      strobe_ = &virtual_->strobe();
+      strobe_.emplace(virtual_->strobe());
       return {};
     case StrobeSource::serial:
-      own_strobe_ = std::make_unique<LazyStrobe>(config.strobe.id, [strobe = config.strobe] {
-        return drivers::open_serial_strobe(strobe.id, strobe.request);
-      });
-      strobe_ = own_strobe_.get();
+      own_strobe_ = std::make_unique<LazyStrobe>(config.strobe.id,
+                                                 [strobe = config.strobe, open = options_.serial_strobe] {
+                                                   return open(strobe.id, strobe.request);
+                                                 });
+      strobe_.emplace(*own_strobe_);
       return {};
     case StrobeSource::replay:
-      strobe_ = replay_->strobe.get();
+      strobe_.emplace(*replay_->strobe);
       return {};
     case StrobeSource::manual:
       EMBERLOCK_RETURN_IF_ERROR(check(config.strobe.dial));
       if (virtual_) {  // its dial is turned by the caller, who plays the operator
-        strobe_ = &virtual_->strobe();
+        strobe_.emplace(virtual_->strobe());
       } else {
         own_strobe_ = std::make_unique<drivers::ManualStrobe>("manual", config.strobe.dial);
-        strobe_ = own_strobe_.get();
+        strobe_.emplace(*own_strobe_);
       }
       return {};
   }
@@ -235,8 +236,17 @@ void Rig::add_borrowed(drivers::Camera& camera, std::string_view driver, const C
   cameras_.push_back(std::move(member));
 }
 
+std::future<Result<drivers::StrobeSettings>> Rig::ask_strobe(std::optional<drivers::StrobeSettings> wanted) {
+  const std::launch when = pace_ == Pace::real_time ? std::launch::async : std::launch::deferred;
+  return std::async(when,
+                    [strobe = strobe(), wanted = std::move(wanted)]() -> Result<drivers::StrobeSettings> {
+                      if (wanted) EMBERLOCK_RETURN_IF_ERROR(strobe->apply(*wanted));
+                      return strobe->read_back();
+                    });
+}
+
 AlignRig Rig::devices() {
-  AlignRig devices{{}, strobe_, clock_.get(), nullptr};
+  AlignRig devices{{}, strobe(), clock_.get(), nullptr};
   for (const Member& member : cameras_) devices.cameras.push_back(member.camera.get());
   return devices;
 }
@@ -277,7 +287,7 @@ std::vector<smear::CcdTiming> Rig::timing() const {
       timing.rows = truth.rows;
       timing.shifts = truth.shifts;
       timing.direction = truth.direction;
-      if (strobe_ != nullptr && strobe_->dial()) timing.row_time = config.row_time.value_or(truth.row_time);
+      if (strobe_ && strobe_->dial()) timing.row_time = config.row_time.value_or(truth.row_time);
     }
     all.push_back(timing);
   }
@@ -294,7 +304,7 @@ Result<AlignRunOptions> Rig::align_options(const AlignmentConfig& config) {
   options.align.tolerance = config.tolerance.value_or(smear::tolerance_for(config.flame));
   options.timing = timing();
   options.align.reset_by = smear::ResetBy::anybody;
-  if (strobe_ != nullptr) options.align.dial = strobe_->dial();
+  if (strobe_) options.align.dial = strobe_->dial();
   if (config.stagger) {
     EMBERLOCK_ASSIGN_OR_RETURN(options.offsets, stagger(devices().cameras));
   }

@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <functional>
+#include <future>
 #include <memory>
 #include <optional>
 #include <span>
@@ -21,6 +22,7 @@
 #include "rig/devices/device_list.h"
 #include "rig/devices/observed_camera.h"
 #include "rig/devices/paced_replay.h"
+#include "rig/devices/shared_strobe.h"
 
 namespace emberlock::rig {
 
@@ -30,6 +32,10 @@ struct RigOptions {
   /// called on the camera's own thread, so it must be thread-safe and return at once.
   std::function<void(std::size_t camera, const Frame&)> on_frame = {};
   std::span<const drivers::CameraDriver> drivers = camera_drivers();
+  /// Opens a strobe of driver "serial".
+  std::function<Result<std::unique_ptr<drivers::Strobe>>(const std::string& id,
+                                                         const drivers::SerialStrobeRequest& request)>
+      serial_strobe = drivers::open_serial_strobe;
   /// Opens a camera of driver "remote": the daemon's business. Absent: there are none.
   std::function<std::unique_ptr<drivers::Camera>(const CameraConfig& config, drivers::CameraInfo expected)>
       remote = {};
@@ -65,8 +71,12 @@ class Rig {
   [[nodiscard]] std::string_view driver(std::size_t index) const { return cameras_.at(index).driver; }
   /// HOST:PORT of the host that has the camera; empty: this one.
   [[nodiscard]] const std::string& host(std::size_t index) const { return cameras_.at(index).config.host; }
-  /// Null if the rig has none.
-  [[nodiscard]] drivers::Strobe* strobe() { return strobe_; }
+  /// Null if the rig has none. Its calls may come from several threads.
+  [[nodiscard]] drivers::Strobe* strobe() { return strobe_ ? &*strobe_ : nullptr; }
+  /// Applies `wanted`, if given, and reads the settings back: in real time on a thread of its own, as a
+  /// silent strobe takes seconds; otherwise when the result is asked for. The rig has a strobe.
+  [[nodiscard]] std::future<Result<drivers::StrobeSettings>> ask_strobe(
+      std::optional<drivers::StrobeSettings> wanted);
   [[nodiscard]] Clock& clock() { return *clock_; }
   /// All devices, for an alignment; without a recorder.
   [[nodiscard]] AlignRig devices();
@@ -128,7 +138,7 @@ class Rig {
   std::optional<drivers::ReplayRig> replay_;
   std::shared_ptr<ReplayPace> replay_pace_;
   std::unique_ptr<drivers::Strobe> own_strobe_;
-  drivers::Strobe* strobe_ = nullptr;
+  std::optional<SharedStrobe> strobe_;
   std::size_t own_ = 0;
   std::vector<Member> cameras_;  ///< last member: destroyed before what they use
 };

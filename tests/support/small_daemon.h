@@ -57,6 +57,12 @@ struct SmallDaemon {
     }
     return done();
   }
+  Result<v1::StrobeState> read_strobe() {
+    return strobe_answer([this](const auto& answer) { conductor->read_strobe(answer); });
+  }
+  Result<v1::StrobeState> apply_strobe(const v1::StrobeState& wanted) {
+    return strobe_answer([&](const auto& answer) { conductor->apply_strobe(wanted, answer); });
+  }
   bool reach(v1::Phase phase, int slices = 2000) {
     return work_until([&] { return conductor->phase() == phase; }, slices);
   }
@@ -94,6 +100,15 @@ struct SmallDaemon {
   daemon::Jobs jobs;
   std::optional<daemon::Conductor> conductor;
   v1::DaemonStatus status;
+
+ private:
+  template <class Ask>
+  Result<v1::StrobeState> strobe_answer(const Ask& ask) {
+    std::optional<Result<v1::StrobeState>> answer;
+    ask([&](Result<v1::StrobeState> made) { answer = std::move(made); });
+    work_until([&] { return answer.has_value(); });
+    return answer.value();
+  }
 };
 
 }  // namespace emberlock::test

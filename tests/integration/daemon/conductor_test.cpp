@@ -104,7 +104,7 @@ TEST_F(Daemon, AStrobeThatSomebodySetsByItsDialLocksThemToo) {
   EXPECT_THAT(status.strobe().reason(), HasSubstr("is set by hand"));
   v1::StrobeState off;
   off.set_output(v1::StrobeState::OFF);
-  EXPECT_EQ(daemon.conductor->apply_strobe(off).error().kind, ErrorKind::refused);
+  EXPECT_EQ(daemon.apply_strobe(off).error().kind, ErrorKind::refused);
 
   ASSERT_TRUE(daemon.conductor->align({}).ok());
   const auto told = [&](const std::string& words) {
@@ -192,7 +192,7 @@ TEST_F(Daemon, ALockedRecordingIsWholeAndTheLockIsCheckedAfterIt) {
   ASSERT_TRUE(daemon.locks());
   ASSERT_TRUE(daemon.record("take 1", 2, false).ok());
   EXPECT_EQ(daemon.conductor->phase(), v1::CAPTURING);
-  const v1::StrobeState dark = *daemon.conductor->strobe();
+  const v1::StrobeState dark = *daemon.read_strobe();
   EXPECT_THAT(dark.code(), ElementsAre(false));  // its time base goes on
   ASSERT_TRUE(daemon.reach(v1::FINISHING));
   const int rounds = static_cast<int>(daemon.conductor->status().alignment().round());
@@ -283,7 +283,7 @@ TEST_F(Daemon, StoppedInMidAlignmentItIsIdleAtOnce) {
   EXPECT_EQ(daemon.conductor->phase(), v1::ALIGNING);
   ASSERT_TRUE(daemon.conductor->stop_sync().ok());
   EXPECT_EQ(daemon.conductor->phase(), v1::IDLE);
-  EXPECT_EQ(daemon.conductor->strobe()->output(), v1::StrobeState::OFF);
+  EXPECT_EQ(daemon.read_strobe()->output(), v1::StrobeState::OFF);
 }
 
 TEST_F(DaemonSlow, TheLockHoldsAsLongAsItIsSaidTo) {
@@ -454,7 +454,7 @@ TEST_F(DaemonAtTheFlame, AStrobeThatFlashesBesideItIsSeen) {
   steady.set_output(v1::StrobeState::STEADY);
   steady.set_rate_hz(24);
   steady.set_width_s(20e-6);
-  ASSERT_TRUE(daemon.conductor->apply_strobe(steady).ok());
+  ASSERT_TRUE(daemon.apply_strobe(steady).ok());
   for (int i = 0; i < 2; ++i) static_cast<void>(camera.next_frame(Seconds(1)));
   EXPECT_GT(seen(*camera.next_frame(Seconds(1))->image).saturated, without + 20);
 }
@@ -467,7 +467,7 @@ TEST_F(DaemonAtTheFlame, RecordingsForAlignmentShowTheStrobeAndOthersTheFlame) {
   const Light idle = recorded("strobe");
   EXPECT_LT(idle.bright, 500);
   EXPECT_GT(idle.saturated, 20) << "the lamp";
-  EXPECT_EQ(daemon.conductor->strobe()->output(), v1::StrobeState::OFF) << "it flashed for that alone";
+  EXPECT_EQ(daemon.read_strobe()->output(), v1::StrobeState::OFF) << "it flashed for that alone";
   ASSERT_TRUE(daemon.locks());
   record(daemon, "locked strobe", "alignment");
   EXPECT_GT(recorded("locked strobe").saturated, 20);

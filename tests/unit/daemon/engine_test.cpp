@@ -2,6 +2,9 @@
 // The conductor on its thread, asked by others.
 #include "daemon/engine/engine.h"
 
+#include <atomic>
+#include <memory>
+#include <string>
 #include <thread>
 
 #include <fcntl.h>
@@ -30,7 +33,9 @@ const ImageLayout kLeftLayout{{64, 48}, PixelFormat::gray8, 8};
 
 class EngineThreads : public ::testing::Test {
  protected:
-  void start() { engine_ = Engine::start(config_, board_).value(); }
+  void start(rig::RigOptions options = {}) {
+    engine_ = Engine::start(config_, board_, {}, std::move(options)).value();
+  }
   [[nodiscard]] v1::Phase phase() const { return board_.status()->phase(); }
   v1::RecordRequest take(double seconds = 0) {
     v1::RecordRequest request;
@@ -84,6 +89,57 @@ TEST_F(EngineThreads, WhatManyAskAtOnceIsDoneAndTheRecordingIsWhole) {
   for (std::thread& client : clients) client.join();
   ASSERT_TRUE(engine_->stop_recording().ok());
   EXPECT_TRUE(session::verify_session(sessions() / "take")->whole());
+}
+
+/// A strobe that answers when it is let: a serial one may take 4 s.
+class HeldStrobe final : public drivers::Strobe {
+ public:
+  struct Hold {
+    std::atomic<bool> silent = false;
+    std::atomic<int> asked = 0;  ///< in vain, so far
+  };
+  explicit HeldStrobe(Hold& hold) : hold_(hold) {}
+  [[nodiscard]] const std::string& id() const override { return id_; }
+  Status apply(const drivers::StrobeSettings& settings) override {
+    settings_ = settings;
+    return {};
+  }
+  Result<drivers::StrobeSettings> read_back() override {
+    if (hold_.silent) ++hold_.asked;
+    EXPECT_TRUE(wait_until([this] { return !hold_.silent; }));
+    return settings_;
+  }
+
+ private:
+  Hold& hold_;
+  std::string id_ = "held";
+  drivers::StrobeSettings settings_;
+};
+
+TEST_F(EngineThreads, AStrobeThatIsSilentForLongerThanTheQueuesHoldCostsARecordingNoFrame) {
+  config_.rig.strobe.source = rig::StrobeSource::serial;
+  config_.rig.strobe.id = "held";
+  config_.rig.virtual_rig.time = rig::VirtualConfig::Time::real;
+  HeldStrobe::Hold hold;
+  rig::RigOptions options;
+  options.queue_frames = 8;
+  options.serial_strobe = [&hold](const std::string&, const drivers::SerialStrobeRequest&) {
+    return Result<std::unique_ptr<drivers::Strobe>>(std::make_unique<HeldStrobe>(hold));
+  };
+  start(std::move(options));
+  ASSERT_TRUE(engine_->record(take()).ok());
+  hold.silent = true;
+  std::thread asker([this] { EXPECT_TRUE(engine_->strobe().ok()); });
+  EXPECT_TRUE(wait_until([&] { return hold.asked > 0; }));
+  const auto recorded = [this] { return board_.status()->recording().frames(); };
+  const auto before = recorded();
+  EXPECT_TRUE(wait_until([&] { return recorded() > before + 3 * 8 * 4; })) << recorded();
+  hold.silent = false;
+  asker.join();
+  const auto stopped = engine_->stop_recording();
+  ASSERT_TRUE(stopped.ok()) << stopped.error().message();
+  EXPECT_EQ(stopped->lost().queue(), 0U);
+  EXPECT_EQ(stopped->state(), v1::RecordingStatus::COMPLETE) << stopped->verdict();
 }
 
 TEST_F(EngineThreads, AJobTellsWhatCameOfIt) {

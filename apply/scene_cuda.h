@@ -25,10 +25,10 @@ struct FlameWork {
 /// A mesh in the CPU's memory; its tree is read where nothing of it is kept yet.
 struct SurfaceWork {
   SurfaceTable table;
-  std::size_t vertices, triangles, materials, textures, texel_bytes;
+  std::size_t vertices = 0, triangles = 0, materials = 0, textures = 0, texel_bytes = 0;
   BvhTriangles bvh;
-  std::size_t nodes;
-  std::shared_ptr<SurfacesOnGpu>* kept;
+  std::size_t nodes = 0;
+  std::shared_ptr<SurfacesOnGpu>* kept = nullptr;
 };
 
 /// TracePixel of all pixels on a GPU; `task`'s picture is in the CPU's memory. Throws a DeviceError.

@@ -48,8 +48,9 @@ SurfaceWork surface_work(const Surfaces& surfaces, const Bvh& bvh) {
           &surfaces.on_gpu()};
 }
 
-void on_cuda(const std::vector<const Flame*>& flames, const std::vector<Flame::View>& views,
-             const LightTables& tables, const Surfaces& surfaces, const PixelTask& task, std::size_t pixels) {
+[[maybe_unused]] void on_cuda(const std::vector<const Flame*>& flames, const std::vector<Flame::View>& views,
+                              const LightTables& tables, const Surfaces& surfaces, const PixelTask& task,
+                              std::size_t pixels) {
   std::vector<FlameWork> work;
   for (std::size_t f = 0; f < flames.size(); ++f)
     work.push_back({tables.flames[f], &views[f].rays, views[f].source, &flames[f]->coarse_shine(),

@@ -164,7 +164,7 @@ struct FineSteps {
 
 /// A flame's steps along any ray, by its coarse grid; of its light the share that close_by() says, of this a;
 /// of its extinction all.
-struct CoarseSteps {
+struct CoarseSteps {  // NOLINT(cppcoreguidelines-pro-type-member-init): filled before it is read
   const FlameTable* flame;
   Vec3 from, along;  // coarse edges; of a metre
   float enters, step, a;

@@ -24,7 +24,7 @@ HOST_DEVICE inline recon::Rgba light_behind(const recon::Rgba& before, const rec
 /// constant values, from near to far without overlaps; where those of several flames overlap, their emission
 /// and their extinction add up. `Steps` has next(RayStep&), which says whether there was another one.
 template <class Steps, int kMost>
-struct MergedLight {
+struct MergedLight {  // NOLINT(cppcoreguidelines-pro-type-member-init): filled before it is read
   Steps steps[kMost];
   RayStep now[kMost];
   int count = 0;

@@ -14,7 +14,7 @@ namespace emberlock::apply {
 
 /// Places of a pixel's samples: the R2 sequence (Roberts 2018), shifted at random.
 struct PlacesInPixel {
-  double shift[2];
+  double shift[2] = {};
 
   HOST_DEVICE inline PlacesInPixel(std::uint64_t seed, std::uint64_t pixel) {
     constexpr std::uint64_t kBeyondSamples = ~std::uint64_t{0};

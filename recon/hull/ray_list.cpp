@@ -344,8 +344,8 @@ PixelsInOrder pixels_in_order(const std::vector<const CameraModel*>& cameras, co
 namespace {
 
 /// Where all pixels that may have rays are dealt to subsets on the GPU, by the options' rule.
-std::vector<TiledView> tiled_views(const std::vector<const CameraModel*>& cameras, const Grid& grid,
-                                   const RayListOptions& options) {
+[[maybe_unused]] std::vector<TiledView> tiled_views(const std::vector<const CameraModel*>& cameras,
+                                                    const Grid& grid, const RayListOptions& options) {
   std::vector<TiledView> views;
   std::uint32_t slot = 0;
   for (std::size_t v = 0; v < cameras.size(); ++v) {

@@ -19,10 +19,9 @@ class FluidArray {
  public:
   FluidArray() = default;
   FluidArray(std::size_t size, Device device) : size_(size), on_gpu_(device == Device::cuda) {
-    if (on_gpu_)
-      gpu_ = gpu_memory(size * sizeof(T));
-    else
-      cpu_.resize(size);
+    if constexpr (kCudaBuilt)
+      if (on_gpu_) gpu_ = gpu_memory(size * sizeof(T));
+    if (!on_gpu_) cpu_.resize(size);
   }
 
   [[nodiscard]] T* data() { return on_gpu_ ? static_cast<T*>(gpu_.get()) : cpu_.data(); }
@@ -30,15 +29,14 @@ class FluidArray {
   [[nodiscard]] std::size_t size() const { return size_; }
   /// Takes size() values.
   void fill(const std::vector<T>& from) {
-    if (on_gpu_)
-      copy_to_gpu(gpu_.get(), from.data(), size_ * sizeof(T));
-    else
-      cpu_ = from;
+    if constexpr (kCudaBuilt)
+      if (on_gpu_) copy_to_gpu(gpu_.get(), from.data(), size_ * sizeof(T));
+    if (!on_gpu_) cpu_ = from;
   }
   [[nodiscard]] std::vector<T> values() const {
     if (!on_gpu_) return cpu_;
     std::vector<T> to(size_);
-    copy_from_gpu(to.data(), gpu_.get(), size_ * sizeof(T));
+    if constexpr (kCudaBuilt) copy_from_gpu(to.data(), gpu_.get(), size_ * sizeof(T));
     return to;
   }
   void swap(FluidArray& o) noexcept {
@@ -126,7 +124,7 @@ class FluidWork {
     std::vector<FluidSums> copied;
     if (device() == Device::cuda) {
       copied.resize(count);
-      copy_from_gpu(copied.data(), from, count * sizeof(FluidSums));
+      if constexpr (kCudaBuilt) copy_from_gpu(copied.data(), from, count * sizeof(FluidSums));
       from = copied.data();
     }
     for (std::size_t i = 0; i < count; ++i) all = greatest ? greater_of(all, from[i]) : all + from[i];

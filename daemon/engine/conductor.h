@@ -125,6 +125,8 @@ class Conductor {
   void darken_strobe();
   void darken_after_recording();
   void note(const Remark& remark);
+  [[nodiscard]] TimePoint find_dark_instant(TimePoint now);
+  void record_opening_events(TimePoint now, const std::optional<v1::DecisionEvent>& lock);
   void carry_out(Action action);
   void begin_alignment();
   void end_alignment();

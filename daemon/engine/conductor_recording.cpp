@@ -81,6 +81,27 @@ Status Conductor::begin_take(const v1::RecordRequest& request, const std::filesy
 
 Status Conductor::stop_recording() { return happen(AskStopRecording{}); }
 
+/// A flash that was under way at `now` may show in the two frames that follow.
+TimePoint Conductor::find_dark_instant(TimePoint now) {
+  if (devices_.strobe->dial()) note({v1::AMBER, Remark::Code::flashes_show});
+  Seconds transport;
+  for (const drivers::Camera* camera : devices_.cameras)
+    transport = std::max(transport, camera->info().transport);
+  return now + 2 * alignment_->options().period + transport;
+}
+
+/// The strobe's settings of an alignment's take, and what proves the lock.
+void Conductor::record_opening_events(TimePoint now, const std::optional<v1::DecisionEvent>& lock) {
+  if (records_strobe() && devices_.strobe != nullptr)
+    static_cast<void>(
+        recorder_->append(drivers::strobe_event(now, alignment_ ? alignment_->strobe() : strobe_settings_)));
+  if (!lock) return;
+  v1::Event event;
+  event.set_monotonic_ns(now.ns);
+  *event.mutable_decision() = part_of(*lock, 0, parts_.rig.own());
+  static_cast<void>(recorder_->append(event));
+}
+
 void Conductor::begin_recording() {
   const bool must_be_dark = state_.lock == Lock::held && !records_strobe();
   // Before the first frame that is recorded: a silent strobe takes seconds.
@@ -90,14 +111,7 @@ void Conductor::begin_recording() {
   record_began_ = part_ ? TimePoint{part_->from_ns()} : now;
   spread_.reset();
   if (state_.lock == Lock::held) spread_ = alignment_->worst_pair(now);
-  if (must_be_dark) {
-    // A flash that was under way may show in the two frames that follow.
-    if (devices_.strobe->dial()) note({v1::AMBER, Remark::Code::flashes_show});
-    Seconds transport;
-    for (const drivers::Camera* camera : devices_.cameras)
-      transport = std::max(transport, camera->info().transport);
-    record_began_ = now + 2 * alignment_->options().period + transport;
-  }
+  if (must_be_dark) record_began_ = find_dark_instant(now);
   if (parts_.hosts.any()) record_began_ = std::max(record_began_, now + kHostsBegin);
   v1::Manifest manifest = describe_take();
   const std::optional<v1::DecisionEvent> lock = lock_evidence();
@@ -116,15 +130,7 @@ void Conductor::begin_recording() {
     return;
   }
   recorder_ = std::move(*recorder);
-  if (records_strobe() && devices_.strobe != nullptr)
-    static_cast<void>(
-        recorder_->append(drivers::strobe_event(now, alignment_ ? alignment_->strobe() : strobe_settings_)));
-  if (lock) {
-    v1::Event event;
-    event.set_monotonic_ns(now.ns);
-    *event.mutable_decision() = part_of(*lock, 0, parts_.rig.own());
-    static_cast<void>(recorder_->append(event));
-  }
+  record_opening_events(now, lock);
   last_frame_.reset();
   expired_ = false;
   counted_before_ = own_counts();

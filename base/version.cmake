@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 # Sets EMBERLOCK_VERSION. At a tag vMAJOR.MINOR.PATCH it is that; commits later it is 0.2.0+12.g1a2b3c4d5e, and 0.2.0+0.g1a2b3c4d5e where no
 # such tag is known; in an archive that git made it is what git wrote here; without git it is the release below and "+unknown".
-# EMBERLOCK_RELEASE is the part before the +. Where no tag is known, scripts/lint takes the last change of this file for the release.
+# EMBERLOCK_RELEASE is the part before the +.
 # `cmake -D FOLDER=... -P base/version.cmake` prints that of another folder.
-set(EMBERLOCK_RELEASE 0.2.0)  # the last one in CHANGELOG.md
+set(EMBERLOCK_RELEASE 0.3.0)  # the last one in CHANGELOG.md
 set(archived "$Format:%(describe:tags=true,match=v[0-9]*)$")
 
 if(NOT FOLDER)

@@ -152,6 +152,17 @@ Status write_frames(const CameraPart& part, session::SessionWriter& writer, cons
   return {};
 }
 
+/// A session of this camera alone.
+Status write_part(const CameraPart& part, const fs::path& folder, const Observer& observer,
+                  std::optional<std::int64_t>& damaged_at) {
+  v1::Manifest manifest;
+  *manifest.add_cameras() = part.stream;
+  EMBERLOCK_ASSIGN_OR_RETURN(session::SessionWriter writer,
+                             session::SessionWriter::create(folder, manifest, part.writer));
+  EMBERLOCK_RETURN_IF_ERROR(write_frames(part, writer, observer, damaged_at));
+  return writer.finish();
+}
+
 }  // namespace
 
 Result<ImportFolder> ImportFolder::open(const fs::path& session, const std::vector<fs::path>& inputs) {
@@ -209,12 +220,11 @@ Status ImportFolder::write(const CameraPart& part, const Observer& observer,
   EMBERLOCK_RETURN_IF_ERROR(
       remove_part(folder, [&](const std::string& path) { return is_of_session(path, id); }));
   EMBERLOCK_RETURN_IF_ERROR(remove_part(work_ / "session" / id, is_of_camera));
-  v1::Manifest manifest;
-  *manifest.add_cameras() = part.stream;
-  EMBERLOCK_ASSIGN_OR_RETURN(session::SessionWriter writer,
-                             session::SessionWriter::create(folder, manifest, part.writer));
-  EMBERLOCK_RETURN_IF_ERROR(write_frames(part, writer, observer, damaged_at));
-  EMBERLOCK_RETURN_IF_ERROR(writer.finish());
+  if (const Status written = write_part(part, folder, observer, damaged_at); !written.ok()) {
+    // The next try begins this camera anew.
+    static_cast<void>(remove_part(folder, [&](const std::string& path) { return is_of_session(path, id); }));
+    return written;
+  }
   return write_file_atomically(mark_of(part), fingerprint(part));
 }
 

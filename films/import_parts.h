@@ -33,7 +33,7 @@ struct CameraPart {
 
 /// Builds a session in a folder beside the final one, "NAME.importing", one camera at a time. A camera is
 /// kept once all its frames are written. An interrupted import continues with the missing cameras, as long as
-/// originals and options are the same. An import that ends before it writes anything leaves no folder.
+/// originals and options are the same. An import that ends before a camera is complete leaves no folder.
 class ImportFolder {
  public:
   ImportFolder(ImportFolder&&) noexcept = default;

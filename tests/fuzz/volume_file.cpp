@@ -12,7 +12,8 @@
 #include "recon/export/vdb_identity.h"
 #include "tests/fuzz/target.h"
 
-// A volume.vdb whose identifier is made to fit its bytes, as anybody can, is read or refused, whatever sizes it states.
+// A volume.vdb whose identifier is made to fit its bytes, as anybody can, is read or refused, whatever sizes
+// it states.
 FUZZ_TARGET(volume_file) {
   using namespace emberlock;
   constexpr std::size_t kIdentified = 57;

@@ -71,6 +71,7 @@ TEST_P(SizeChangeTest, ImportNamesTheFrameAndBothSizes) {
   EXPECT_EQ(refused.exit_code, 2);
   EXPECT_THAT(refused.err, HasSubstr("frame 10 has 96 x 64 pixels, and those before it 160 x 120"));
   EXPECT_FALSE(fs::exists(temp_ / "session"));
+  EXPECT_FALSE(fs::exists(temp_ / "session.importing")) << "no camera of it is complete";
 }
 
 using SizeChangeJoined = SizeChangeTest;

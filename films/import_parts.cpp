@@ -160,7 +160,8 @@ Status write_part(const CameraPart& part, const fs::path& folder, const Observer
   EMBERLOCK_ASSIGN_OR_RETURN(session::SessionWriter writer,
                              session::SessionWriter::create(folder, manifest, part.writer));
   EMBERLOCK_RETURN_IF_ERROR(write_frames(part, writer, observer, damaged_at));
-  return writer.finish();
+  EMBERLOCK_RETURN_IF_ERROR(writer.finish());
+  return {};
 }
 
 }  // namespace

@@ -306,7 +306,7 @@ class Operator {
   }
   bool verify() {
     const test::HttpAnswer answer = call("Sessions/Verify", {{"session", take_}});
-    if (answer.status == 200 && answer.body.find("\"done\":true,\"ok\":true") != std::string::npos)
+    if (answer.status == 200 && answer.body.find("\"outcome\":{\"ok\":true") != std::string::npos)
       return true;
     soak_.findings.add(fmt::format("{} isn't verified: {} {}", take_, answer.status, answer.body));
     return false;

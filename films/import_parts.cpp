@@ -221,7 +221,7 @@ Status ImportFolder::write(const CameraPart& part, const Observer& observer,
   EMBERLOCK_RETURN_IF_ERROR(
       remove_part(folder, [&](const std::string& path) { return is_of_session(path, id); }));
   EMBERLOCK_RETURN_IF_ERROR(remove_part(work_ / "session" / id, is_of_camera));
-  if (const Status written = write_part(part, folder, observer, damaged_at); !written.ok()) {
+  if (Status written = write_part(part, folder, observer, damaged_at); !written.ok()) {
     // The next try begins this camera anew.
     static_cast<void>(remove_part(folder, [&](const std::string& path) { return is_of_session(path, id); }));
     return written;

@@ -422,6 +422,7 @@ int run(Plan plan) {
          soak.findings.number() < kFindingsAtMost) {
     soak.guard([&] { someone.go_round(); });
     someone.report();
+    fmt::print("{:.0f} MB resident\n", soak.daemon.resident_mb());
     std::fflush(stdout);
   }
   const double cpu_s = soak.daemon.cpu_s();

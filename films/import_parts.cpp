@@ -152,7 +152,7 @@ Status write_frames(const CameraPart& part, session::SessionWriter& writer, cons
   return {};
 }
 
-/// A session of this camera alone.
+/// Writes the frames of one camera as a session.
 Status write_part(const CameraPart& part, const fs::path& folder, const Observer& observer,
                   std::optional<std::int64_t>& damaged_at) {
   v1::Manifest manifest;

@@ -52,7 +52,7 @@ Conductor::Conductor(const ConductorParts& parts, rig::StopAsked stop, const rig
     if (const Status started = camera->start(); !started.ok())
       parts_.board.notice(v1::AMBER, started.error().message());
   }
-  if (devices_.strobe != nullptr) static_cast<void>(know_strobe(devices_.strobe->read_back()));
+  if (devices_.strobe != nullptr) static_cast<void>(update_strobe_state(devices_.strobe->read_back()));
   set_scene();
 }
 
@@ -84,7 +84,7 @@ Status Conductor::check_strobe() const {
   return Error{ErrorKind::refused, "the rig has no strobe", "[rig.strobe]", "Configure one"};
 }
 
-Result<v1::StrobeState> Conductor::know_strobe(const Result<drivers::StrobeSettings>& settings) {
+Result<v1::StrobeState> Conductor::update_strobe_state(const Result<drivers::StrobeSettings>& settings) {
   strobe_status_ = settings.ok() ? Status{} : Status(settings.error());
   for (const MachineEvent& event : watch_.strobe(devices_.strobe->id(), strobe_status_))
     static_cast<void>(happen(event));
@@ -125,7 +125,7 @@ void Conductor::take_strobe_answers() {
          strobe_calls_.front().settings.wait_for(std::chrono::seconds(0)) != std::future_status::timeout) {
     StrobeCall call = std::move(strobe_calls_.front());
     strobe_calls_.pop_front();
-    Result<v1::StrobeState> state = know_strobe(call.settings.get());
+    Result<v1::StrobeState> state = update_strobe_state(call.settings.get());
     if (state.ok() && call.applies && recorder_ && !finishing_) {
       const Status kept =
           recorder_->append(drivers::strobe_event(parts_.rig.clock().now(), strobe_settings_));

@@ -111,10 +111,10 @@ class Conductor {
   [[nodiscard]] Status check_strobe() const;
   void call_strobe(std::optional<drivers::StrobeSettings> wanted, StrobeAnswer answer);
   void take_strobe_answers();
-  /// Until nobody else's call is under way.
+  /// Waits until no call of the strobe is pending.
   void await_strobe();
-  /// What a call brought becomes what is known of the strobe.
-  Result<v1::StrobeState> know_strobe(const Result<drivers::StrobeSettings>& settings);
+  /// Stores the settings or the error that a call returned, and raises or clears the strobe's fault.
+  Result<v1::StrobeState> update_strobe_state(const Result<drivers::StrobeSettings>& settings);
   Status renew(const v1::AlignRequest& request);
   /// How long a take may be that begins now.
   [[nodiscard]] TakeLength take_length(Seconds asked) const;

@@ -187,7 +187,7 @@ void Conductor::explain_failure(const Error& error) {
   watch_devices();
   if (!alignment_) return;
   if (!watch_.all_film()) return break_alignment(Why::camera_away);
-  if (!know_strobe(devices_.strobe->read_back()).ok()) return break_alignment(Why::strobe_away);
+  if (!update_strobe_state(devices_.strobe->read_back()).ok()) return break_alignment(Why::strobe_away);
   static_cast<void>(happen(RoundDone{v1::AlignmentStatus::GIVEN_UP, error}));
 }
 

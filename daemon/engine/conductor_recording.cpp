@@ -81,7 +81,7 @@ Status Conductor::begin_take(const v1::RecordRequest& request, const std::filesy
 
 Status Conductor::stop_recording() { return happen(AskStopRecording{}); }
 
-/// A flash that was under way at `now` may show in the two frames that follow.
+/// Returns the start of the first frame without a flash: one under way at `now` may show in two frames.
 TimePoint Conductor::find_dark_instant(TimePoint now) {
   if (devices_.strobe->dial()) note({v1::AMBER, Remark::Code::flashes_show});
   Seconds transport;
@@ -90,7 +90,7 @@ TimePoint Conductor::find_dark_instant(TimePoint now) {
   return now + 2 * alignment_->options().period + transport;
 }
 
-/// The strobe's settings of an alignment's take, and what proves the lock.
+/// Appends the strobe's settings, in an alignment's take, and the lock's evidence.
 void Conductor::record_opening_events(TimePoint now, const std::optional<v1::DecisionEvent>& lock) {
   if (records_strobe() && devices_.strobe != nullptr)
     static_cast<void>(
@@ -185,7 +185,7 @@ Status Conductor::light_strobe() {
   return {};
 }
 
-/// The strobe, if it flashed for a recording alone.
+/// Switches the strobe off if it flashed only for the recording.
 void Conductor::darken_after_recording() {
   if (std::exchange(lit_for_recording_, false)) darken_strobe();
 }
@@ -196,7 +196,7 @@ void Conductor::darken_strobe() {
   dark.output = drivers::StrobeOutput::off;
   if (const Status off = devices_.strobe->apply(dark); !off.ok())
     parts_.board.notice(v1::AMBER, off.error().message());
-  static_cast<void>(know_strobe(devices_.strobe->read_back()));
+  static_cast<void>(update_strobe_state(devices_.strobe->read_back()));
 }
 
 /// work() takes what is still on its way and finishes, so that whoever asked needn't wait.

@@ -235,12 +235,12 @@ Status Engine::acknowledge(const v1::AcknowledgeRequest& request) {
 Result<v1::ListDevicesResponse> Engine::list_devices() { return to_proto(rig::list_devices()); }
 
 Result<v1::StrobeState> Engine::strobe() {
-  return until_done<Result<v1::StrobeState>>(
+  return await_answer<Result<v1::StrobeState>>(
       Urgency::waits, [](Conductor& c, Conductor::StrobeAnswer done) { c.read_strobe(std::move(done)); });
 }
 
 Result<v1::StrobeState> Engine::apply_strobe(const v1::StrobeState& wanted) {
-  return until_done<Result<v1::StrobeState>>(
+  return await_answer<Result<v1::StrobeState>>(
       Urgency::waits,
       [wanted](Conductor& c, Conductor::StrobeAnswer done) { c.apply_strobe(wanted, std::move(done)); });
 }
@@ -358,12 +358,12 @@ Result<v1::ReconstructionStatus> Engine::finish_reconstruction() { return recons
 Result<v1::ArStatus> Engine::start_ar(const v1::ArRequest& request) {
   EMBERLOCK_ASSIGN_OR_RETURN(const ArCamera camera,
                              on_thread<Result<ArCamera>>(Urgency::waits, [this, request](Conductor&) {
-                               return ar_camera(request.camera_id());
+                               return find_ar_camera(request.camera_id());
                              }));
   return ar_->start(request, camera);
 }
 
-Result<ArCamera> Engine::ar_camera(const std::string& id) {
+Result<ArCamera> Engine::find_ar_camera(const std::string& id) {
   for (std::size_t i = 0; i < rig_->size(); ++i) {
     const drivers::CameraInfo& info = rig_->camera(i).info();
     if (info.id == id) return ArCamera{info.id, info.layout, geometry_.calibration_of(info.id)};

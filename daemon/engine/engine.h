@@ -107,14 +107,15 @@ class Engine final : public Api, public Lender {
   void show(const Conductor& conductor);
   void refuse_calls();
   /// On the thread: a camera's layout changes as it comes back.
-  Result<ArCamera> ar_camera(const std::string& id);
+  Result<ArCamera> find_ar_camera(const std::string& id);
   void post(std::function<void(Conductor&)> call);
   /// Has it done on the thread, and waits for that.
   template <class Answer>
   Answer on_thread(Urgency urgency, std::function<Answer(Conductor&)> call);
   /// Has it begun on the thread, and waits until it calls `done`, on the thread too.
   template <class Answer>
-  Answer until_done(Urgency urgency, std::function<void(Conductor&, std::function<void(Answer)> done)> begin);
+  Answer await_answer(Urgency urgency,
+                      std::function<void(Conductor&, std::function<void(Answer)> done)> begin);
 
   const rig::DaemonConfig config_;
   Board& board_;
@@ -149,8 +150,8 @@ class Engine final : public Api, public Lender {
 };
 
 template <class Answer>
-Answer Engine::until_done(Urgency urgency,
-                          std::function<void(Conductor&, std::function<void(Answer)> done)> begin) {
+Answer Engine::await_answer(Urgency urgency,
+                            std::function<void(Conductor&, std::function<void(Answer)> done)> begin) {
   auto promise = std::make_shared<std::promise<Answer>>();
   std::future<Answer> answer = promise->get_future();
   const bool urgent = urgency == Urgency::interrupts;
@@ -158,8 +159,7 @@ Answer Engine::until_done(Urgency urgency,
   post([this, urgent, promise = std::move(promise), begin = std::move(begin)](Conductor& conductor) {
     if (urgent) --urgent_;
     begin(conductor, [this, promise, &conductor](Answer made) {
-      show(
-          conductor);  // whoever has the answer finds in the status what it did, however long the round lasts
+      show(conductor);  // the status holds the result before the caller has its answer
       promise->set_value(std::move(made));
     });
   });
@@ -172,7 +172,7 @@ Answer Engine::until_done(Urgency urgency,
 
 template <class Answer>
 Answer Engine::on_thread(Urgency urgency, std::function<Answer(Conductor&)> call) {
-  return until_done<Answer>(
+  return await_answer<Answer>(
       urgency, [call = std::move(call)](Conductor& conductor, const auto& done) { done(call(conductor)); });
 }
 

@@ -89,18 +89,17 @@ test('the flame stands on the marker, and follows it', async () => {
   await until(told, words => words.includes('Marker found'), 'the marker is found');
   came.length = 0;
   await until(() => came.length, pictures => pictures > 36, 'pictures come');
-  const places: [number, number][] = [];
+  const markers: number[] = [];
   for (const {header, jpeg} of came.filter((_, at) => at % 6 === 0)) {
     const flame = await flameIn(jpeg);
-    const [x, y] = truth[header.frame_id]!;
+    // Which frames come is up to the machine: each is held against the truth of its own frame. The flame's middle is near 4 cm above the marker.
+    const [x, y, middleX] = truth[header.frame_id]!;
     expect(flame.count, `frame ${header.frame_id}`).toBeGreaterThan(300);
-    expect(Math.abs(flame.x - x), `beside the marker in frame ${header.frame_id}`).toBeLessThan(25);
+    expect(Math.abs(flame.x - middleX), `on the marker in frame ${header.frame_id}`).toBeLessThan(4);
     expect(Math.abs(flame.lowest - y), `above the marker in frame ${header.frame_id}`).toBeLessThan(25);
-    places.push([flame.x, x]);
+    markers.push(x);
   }
-  const moved = (at: 0 | 1) => Math.max(...places.map(place => place[at])) - Math.min(...places.map(place => place[at]));
-  expect(moved(1), 'the marker moved').toBeGreaterThan(15);
-  expect(moved(0) / moved(1), 'and the flame with it').toBeGreaterThan(0.8);
+  expect(Math.max(...markers) - Math.min(...markers), 'the marker moved').toBeGreaterThan(15);
   // What is on the screen is what came.
   const seen = await page.locator('.enlarged .picture canvas').first().evaluate((canvas: HTMLCanvasElement) => {
     const {data} = canvas.getContext('2d')!.getImageData(0, 0, canvas.width, canvas.height);

@@ -92,7 +92,12 @@ Status CameraReader::open_segment(std::uint32_t number) {
                  (folder_ / segment_name(camera_id_, number, Encoding::ffv1)).string(),
                  "Restore the file; frames of other segments stay readable"};
   }
-  EMBERLOCK_ASSIGN_OR_RETURN(segment_, SegmentReader::open(path, layout_));
+  auto opened = SegmentReader::open(path, layout_);
+  // transcode() may have replaced the file since it was found.
+  if (const fs::path now = find_segment(folder_, camera_id_, number); !opened && !now.empty() && now != path)
+    opened = SegmentReader::open(now, layout_);
+  if (!opened) return opened.error();
+  segment_ = std::move(opened).value();
   number_ = number;
   return {};
 }

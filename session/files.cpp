@@ -74,7 +74,8 @@ std::string segment_name(const std::string& camera_id, std::uint32_t segment, En
 }
 
 fs::path find_segment(const fs::path& folder, const std::string& camera_id, std::uint32_t segment) {
-  for (const Encoding encoding : {Encoding::ffv1, Encoding::raw_nut}) {
+  // transcode() puts the compressed file in place, then removes the other: who saw neither looks again.
+  for (const Encoding encoding : {Encoding::ffv1, Encoding::raw_nut, Encoding::ffv1}) {
     std::error_code ec;
     fs::path path = folder / segment_name(camera_id, segment, encoding);
     if (fs::is_regular_file(path, ec)) return path;

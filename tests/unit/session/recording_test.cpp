@@ -2,7 +2,9 @@
 #include "tests/support/recording.h"
 
 #include <algorithm>
+#include <atomic>
 #include <string>
+#include <thread>
 #include <tuple>
 #include <vector>
 
@@ -312,6 +314,34 @@ TEST(RecordingThreads, TranscodingRawKeepsEveryPixelAndDropsTheRawFiles) {
     ASSERT_TRUE(frame) << frame.error().message();
     EXPECT_EQ(*frame->image, *noise_frame(layout, i).image);
   }
+}
+
+TEST(RecordingThreads, WhoReadsWhileItIsTranscodedGetsEveryFrame) {
+  constexpr std::size_t kFrames = 500;
+  const TempFolder temp;
+  WriterOptions options = small_disk_options(Encoding::raw_nut);
+  options.frames_per_segment = 1;  // each frame waits in a file that goes
+  record(temp / "s", kSmall, kFrames, options);
+  auto reader = SessionReader::open(temp / "s");
+  ASSERT_TRUE(reader) << reader.error().message();
+  std::atomic<bool> transcoded = false;
+  std::thread transcodes([&] {
+    EXPECT_TRUE(transcode(temp / "s"));
+    transcoded = true;
+  });
+  // The frame that is transcoded just now, and its neighbour, so that each time a file is opened.
+  const auto waits = [&](std::size_t i) {
+    return std::filesystem::exists(temp / "s" / segment_name("cam0", static_cast<std::uint32_t>(i), Encoding::raw_nut));
+  };
+  std::size_t failed = 0;
+  for (std::size_t i = 0; i + 1 < kFrames; ++i) {
+    do {
+      failed += reader->read(0, i).ok() ? 0 : 1;
+      failed += reader->read(0, i + 1).ok() ? 0 : 1;
+    } while (waits(i) && !transcoded);
+  }
+  EXPECT_EQ(failed, 0U);
+  transcodes.join();
 }
 
 TEST(RecordingThreads, TranscodingADamagedRawSegmentKeepsIt) {

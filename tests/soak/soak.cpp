@@ -294,7 +294,19 @@ class Operator {
   }
   bool record() {
     take_ = fmt::format("take {}", rounds_);
-    if (!good("Capture/Record", {{"name", take_}, {"seconds", kRecorded}, {"unlocked", true}})) return false;
+    const Json wanted{{"name", take_}, {"seconds", kRecorded}, {"unlocked", true}};
+    // While the lock is renewed the daemon asks for a second or two of patience.
+    const auto until = Clock::now() + kPatience;
+    test::HttpAnswer answer = call("Capture/Record", wanted);
+    while (answer.status == 409 && answer.body.find("ask again") != std::string::npos &&
+           Clock::now() < until) {
+      std::this_thread::sleep_for(500ms);
+      answer = call("Capture/Record", wanted);
+    }
+    if (answer.status != 200) {
+      soak_.findings.add(fmt::format("{} isn't begun: {} {}", take_, answer.status, answer.body));
+      return false;
+    }
     const Json recording = after({"CAPTURING", "FINISHING"})["recording"];
     ++recordings_;
     frames_ += std::stoull(recording.value("frames", "0"));

@@ -331,7 +331,8 @@ TEST(RecordingThreads, WhoReadsWhileItIsTranscodedGetsEveryFrame) {
   });
   // The frame that is transcoded just now, and its neighbour, so that each time a file is opened.
   const auto waits = [&](std::size_t i) {
-    return std::filesystem::exists(temp / "s" / segment_name("cam0", static_cast<std::uint32_t>(i), Encoding::raw_nut));
+    return std::filesystem::exists(temp / "s" /
+                                   segment_name("cam0", static_cast<std::uint32_t>(i), Encoding::raw_nut));
   };
   std::size_t failed = 0;
   for (std::size_t i = 0; i + 1 < kFrames; ++i) {

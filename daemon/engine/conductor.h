@@ -79,8 +79,9 @@ class Conductor {
   Status trim_lent(const Borrower& leader, const v1::TrimRequest& request);
   Result<v1::HostPart> record_part(const Borrower& leader, const v1::PartRequest& request);
   Status stop_part(const Borrower& leader, const v1::StopPartRequest& request);
-  /// Error out_of_data: there is none.
-  Result<v1::HostPart> part(const Borrower& leader, const v1::FindPartRequest& request);
+  /// Hears the leader, and tells of its part of this session where that is being recorded.
+  Result<std::optional<v1::HostPart>> find_running_part(const Borrower& leader,
+                                                        const std::string& session_id);
 
   // What became of a session in the background.
   void transcoded(const std::string& session, const JobResult& result);

@@ -3,36 +3,22 @@
 // leads.
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <utility>
 
 #include <fmt/format.h>
 
 #include "base/clock.h"
 #include "daemon/engine/conductor.h"
+#include "daemon/engine/finished_part.h"
 #include "daemon/engine/host_evidence.h"
 #include "daemon/engine/words.h"
 #include "drivers/replay/record.h"
 #include "rig/align/decision_proto.h"
-#include "session/files.h"
 #include "session/name.h"
-#include "session/reader.h"
 #include "smear_sync/align/stagger.h"
 
 namespace emberlock::daemon {
 namespace {
-
-/// Of sessions that are called like a take, at a host that lends.
-constexpr int kMostOfAName = 99;
-
-/// The nth name for a part: the take's, then that with a number, shortened where both would be too long.
-std::string name_of_part(const std::string& name, int n) {
-  std::string stem = session::stored_name(name);
-  if (n == 1) return stem;
-  const std::string number = fmt::format(" {}", n);
-  while (!stem.empty() && !session::check_session_name(stem + number)) stem.pop_back();
-  return stem + number;
-}
 
 /// Staggered cameras' places in the frame period, known to the tolerance that the lock holds.
 void describe_stagger(const rig::Alignment& alignment, v1::Manifest& manifest) {
@@ -69,36 +55,6 @@ void take_from(const v1::Manifest& told, v1::Manifest& manifest) {
       stream.set_late_s(known.late_s());
       stream.set_late_sigma_s(known.late_sigma_s());
     }
-}
-
-/// To what instant the frames of each camera reach; 0 where one has none.
-std::int64_t reached(const session::SessionReader& session) {
-  std::int64_t until = std::numeric_limits<std::int64_t>::max();
-  for (std::size_t i = 0; i < session.camera_count(); ++i) {
-    const auto& stamps = session.stamps(i);
-    until = std::min(until, stamps.empty() ? 0 : stamps.back().monotonic_time.ns);
-  }
-  return until;
-}
-
-/// A part that isn't being recorded any more.
-Result<v1::HostPart> finished_part(const std::filesystem::path& folder, const v1::Manifest& manifest) {
-  v1::HostPart part;
-  part.set_session(folder.filename().string());
-  part.set_state(v1::HostPart::RECORDING);
-  if (manifest.state() == v1::Manifest::RECORDING) return part;  // being finished, or salvaged
-  for (const v1::CameraStream& camera : manifest.cameras()) {
-    part.set_frames(part.frames() + camera.counts().recorded());
-    part.set_lost(part.lost() + lost(camera.counts()));
-  }
-  const auto session = session::SessionReader::open(folder);
-  if (session.ok()) part.set_until_ns(reached(*session));
-  const bool salvaged = manifest.state() == v1::Manifest::SALVAGED;
-  part.set_state(salvaged || !session.ok() ? v1::HostPart::SHORT : v1::HostPart::WHOLE);
-  if (salvaged)
-    part.set_why("its emberlockd ended in the midst of it; what had reached the disk was salvaged");
-  if (!session.ok()) part.set_why(session.error().message());
-  return part;
 }
 
 /// Clocks that are known to milliseconds, orders that are meant for now.
@@ -196,7 +152,7 @@ Status Conductor::trim_lent(const Borrower& leader, const v1::TrimRequest& reque
 Result<std::filesystem::path> Conductor::path_for_part(const std::string& name) const {
   EMBERLOCK_RETURN_IF_ERROR(session::check_session_name(name));
   for (int n = 1; n <= kMostOfAName; ++n) {
-    auto path = parts_.store.path_for_new(name_of_part(name, n), wall_clock());
+    auto path = parts_.store.path_for_new(name_part(name, n), wall_clock());
     if (path.ok() || path.error().kind != ErrorKind::bad_input) return path;
   }
   return parts_.store.path_for_new({}, wall_clock());
@@ -241,23 +197,13 @@ Status Conductor::stop_part(const Borrower& leader, const v1::StopPartRequest& r
   return happen(AskStopRecording{});
 }
 
-Result<v1::HostPart> Conductor::part(const Borrower& leader, const v1::FindPartRequest& request) {
+Result<std::optional<v1::HostPart>> Conductor::find_running_part(const Borrower& leader,
+                                                                 const std::string& session_id) {
   EMBERLOCK_ASSIGN_OR_RETURN(const bool has_loan, parts_.loan.hear(leader, SteadyClock().now()));
-  if (records_for_another() && part_->manifest().session_id() == request.session_id()) {
-    if (has_loan) part_heard_ = SteadyClock().now();
-    return running_part();
-  }
-  Error none{ErrorKind::out_of_data, "it has no part of this session", request.name(), "Look for it there"};
-  // The answer that would have said which of these names it has may have been lost.
-  for (int n = 1; n <= kMostOfAName; ++n) {
-    const auto folder = parts_.store.path_of(name_of_part(request.name(), n));
-    if (!folder.ok()) continue;
-    const auto manifest = session::read_manifest(*folder);
-    if (manifest.ok() && manifest->session_id() == request.session_id())
-      return finished_part(*folder, *manifest);
-    if (!manifest.ok() && n == 1) none = manifest.error();
-  }
-  return none;
+  if (!records_for_another() || part_->manifest().session_id() != session_id)
+    return std::optional<v1::HostPart>();
+  if (has_loan) part_heard_ = SteadyClock().now();
+  return std::optional(running_part());
 }
 
 v1::Manifest Conductor::describe_take() const {

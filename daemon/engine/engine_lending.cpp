@@ -1,7 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 // What a host that leads asks of this one.
+#include <optional>
+
 #include "base/clock.h"
 #include "daemon/engine/engine.h"
+#include "daemon/engine/finished_part.h"
 
 namespace emberlock::daemon {
 
@@ -44,8 +47,13 @@ Status Engine::stop_part(const Borrower& leader, const v1::StopPartRequest& requ
 }
 
 Result<v1::HostPart> Engine::part(const Borrower& leader, const v1::FindPartRequest& request) {
-  return on_thread<Result<v1::HostPart>>(Urgency::waits,
-                                         [leader, request](Conductor& c) { return c.part(leader, request); });
+  using Running = std::optional<v1::HostPart>;
+  EMBERLOCK_ASSIGN_OR_RETURN(const Running running,
+                             on_thread<Result<Running>>(Urgency::waits, [leader, request](Conductor& c) {
+                               return c.find_running_part(leader, request.session_id());
+                             }));
+  if (running) return *running;
+  return find_finished_part(store_, request);
 }
 
 }  // namespace emberlock::daemon

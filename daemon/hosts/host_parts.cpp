@@ -72,7 +72,7 @@ HostParts::~HostParts() {
   }
   wakes_.notify_all();
   if (thread_.joinable()) thread_.join();
-  for (std::thread& one : beginning_) one.join();
+  beginning_.clear();  // waits for them
 }
 
 std::vector<std::string> HostParts::addresses() const {
@@ -119,9 +119,12 @@ void HostParts::begin(Part& part, const std::filesystem::path& folder) {
 
 void HostParts::begin(const std::filesystem::path& folder, const std::vector<v1::PartRequest>& requests,
                       const std::vector<v1::HostPart>& known) {
-  for (std::thread& one : beginning_) one.join();  // of a take that ended long ago
-  beginning_.clear();
   const std::lock_guard lock(mutex_);
+  // A host that doesn't answer may still be asked for an earlier take: this thread drains the cameras, so it
+  // doesn't wait for that.
+  std::erase_if(beginning_, [](const std::future<void>& one) {
+    return one.wait_for(std::chrono::seconds(0)) == std::future_status::ready;
+  });
   // One of this name that was there before was taken away.
   std::erase_if(takes_, [&](const Take& take) { return take.folder == folder; });
   Take& take = takes_.emplace_back(Take{.folder = folder});
@@ -129,12 +132,13 @@ void HostParts::begin(const std::filesystem::path& folder, const std::vector<v1:
     take.session_id = requests[i].manifest().session_id();
     Part& part = take.parts.emplace_back(Part{.host = hosts_[i], .request = requests[i], .known = known[i]});
     part.busy = true;
-    beginning_.emplace_back([this, part, folder, i, session = take.session_id]() mutable {
+    auto begin_part = [this, part, folder, i, session = take.session_id]() mutable {
       begin(part, folder);
       const std::lock_guard inner(mutex_);
       part.busy = false;
       take_over(session, i, std::move(part));
-    });
+    };
+    beginning_.push_back(std::async(std::launch::async, std::move(begin_part)));
   }
 }
 

@@ -3,6 +3,7 @@
 
 #include <condition_variable>
 #include <filesystem>
+#include <future>
 #include <memory>
 #include <mutex>
 #include <optional>
@@ -101,7 +102,7 @@ class HostParts {
   bool ending_ = false;
   bool hurries_ = false;
   std::vector<Take> takes_;
-  std::vector<std::thread> beginning_;  ///< of the newest take
+  std::vector<std::future<void>> beginning_;  ///< each has a host begin a part
   std::vector<PartNews> news_;
   std::thread thread_;  ///< last: it uses all of the above; none without hosts
 };

@@ -8,6 +8,7 @@
 #include <gtest/gtest.h>
 
 #include "base/clock.h"
+#include "daemon/engine/finished_part.h"
 #include "tests/support/small_daemon.h"
 
 namespace emberlock::daemon {
@@ -88,16 +89,15 @@ TEST(Lending, ATakeIsRecordedWhateverHasItsNameAndFoundByIt) {
     ASSERT_TRUE(daemon.conductor->stop_recording().ok()) << row.name;
     ASSERT_TRUE(daemon.reach(v1::IDLE)) << row.name;
     // Its answer was lost: the leader knows the take's name only.
-    const auto found = daemon.conductor->part(kLeader, find_request(row.name, id));
+    const auto found = find_finished_part(daemon.store, find_request(row.name, id));
     ASSERT_TRUE(found.ok()) << row.name << ": " << found.error().message();
     EXPECT_EQ(found->session(), row.becomes);
-    EXPECT_EQ(daemon.conductor->part(kLeader, find_request(row.name, "another id")).error().kind,
+    EXPECT_EQ(find_finished_part(daemon.store, find_request(row.name, "another id")).error().kind,
               row.name == "broken" ? ErrorKind::bad_input : ErrorKind::out_of_data);
   }
   const Borrower twin{kLeader.name, "another certificate"};
   EXPECT_EQ(daemon.conductor->record_part(twin, part_request("twin", "id")).error().kind, ErrorKind::refused);
-  EXPECT_EQ(daemon.conductor->part(twin, find_request("free", "id of free")).error().kind,
-            ErrorKind::refused);
+  EXPECT_EQ(daemon.conductor->find_running_part(twin, "id of free").error().kind, ErrorKind::refused);
 }
 
 }  // namespace

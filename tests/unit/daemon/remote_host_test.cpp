@@ -71,6 +71,7 @@ class FakeLender final : public Lender {
     return {};
   }
   Result<v1::HostPart> record_part(const Borrower& /*leader*/, const v1::PartRequest& request) override {
+    if (answers_late) static_cast<void>(wait_until([this] { return !answers_late; }));
     const std::lock_guard lock(mutex);
     if (refuses) return Error{ErrorKind::refused, "its disk is full", "emberlockd", "Free space"};
     recorded = request;
@@ -102,7 +103,8 @@ class FakeLender final : public Lender {
   std::atomic<int> watches = 0;        ///< that have begun
   std::atomic<bool> films = true;
   bool refuses = false;
-  bool loses_answers = false;  ///< to Record and to Part
+  bool loses_answers = false;              ///< to Record and to Part
+  std::atomic<bool> answers_late = false;  ///< to Record: not before this is false again
   Loan loan{1};
   std::vector<v1::ResetRequest> resets;
   double trim_ppm = 0;
@@ -338,6 +340,20 @@ TEST_F(HostPartsTest, APartIsBegunEndedAndKnownToBeWhole) {
   EXPECT_EQ(kept().clock_size(), 2);
   EXPECT_TRUE(any_news(parts, v1::HostPart::WHOLE));
   EXPECT_TRUE(wait_until([&] { return parts.of(folder).empty(); })) << "nothing more is asked";
+}
+
+TEST_F(HostPartsTest, AHostThatHangsDoesntHoldTheNextTakeUp) {
+  lender.answers_late = true;
+  // A machine that stands still for 1.5 s could hide the answer; hardly five times.
+  bool waited = true;
+  for (int attempt = 0; waited && attempt < 5; ++attempt) {
+    HostParts parts({known_host()});
+    begin(parts);
+    parts.begin(temp / "next", {request}, {known});
+    waited = parts.of(folder)[0].state() == v1::HostPart::MISSING;  // it was given up meanwhile
+  }
+  lender.answers_late = false;
+  EXPECT_FALSE(waited);
 }
 
 TEST_F(HostPartsTest, OneThatEndsEarlyIsShort) {

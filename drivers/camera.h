@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <optional>
 #include <string>
 
@@ -57,6 +58,10 @@ struct FrameCounts {
 
 /// Maximum duration of a call that has no deadline argument.
 inline constexpr Seconds kCallDeadline{2};
+
+/// Takes a camera's frames as they come, with what the camera counts then. Returns at once, and doesn't call
+/// the camera.
+using FrameSink = std::function<void(const Frame& frame, const FrameCounts& counts)>;
 
 /// An opened camera. One owner thread; not thread-safe. Times are on the host clock that was given to the
 /// driver.

@@ -82,12 +82,18 @@ class CameraThread::Worker : public std::enable_shared_from_this<Worker> {
 
   FrameCounts counts() const {
     const std::lock_guard lock(mutex_);
-    FrameCounts all = of_camera_;
-    all.delivered = own_.delivered;
-    all.damaged = own_.damaged;
-    all.queue += own_.queue;
-    all.passed_over += own_.passed_over;
-    return all;
+    return counted();
+  }
+
+  FrameCounts feed(FrameSink sink) {
+    const std::lock_guard lock(mutex_);
+    const FrameCounts before = counted();
+    sink_ = std::move(sink);
+    if (!sink_) return before;
+    for (const Result<Frame>& waiting : waiting_)
+      if (waiting) hand_on(*waiting);
+    std::erase_if(waiting_, [](const Result<Frame>& waiting) { return waiting.ok(); });
+    return before;
   }
 
   /// Has the thread call `act` and waits for the result. If it takes too long, the call is cancelled.
@@ -176,7 +182,7 @@ class CameraThread::Worker : public std::enable_shared_from_this<Worker> {
     if (!waiting_.empty()) {
       Result<Frame> next = std::move(waiting_.front());
       waiting_.pop_front();
-      if (next) ++(next->stamp.status == FrameStatus::complete ? own_.delivered : own_.damaged);
+      if (next) count(*next);
       return next;
     }
     if (hangs()) return hanging();
@@ -235,6 +241,21 @@ class CameraThread::Worker : public std::enable_shared_from_this<Worker> {
   // These require the lock.
 
   [[nodiscard]] std::string where() const { return "camera " + id_; }
+  [[nodiscard]] FrameCounts counted() const {
+    FrameCounts all = of_camera_;
+    all.delivered = own_.delivered;
+    all.damaged = own_.damaged;
+    all.queue += own_.queue;
+    all.passed_over += own_.passed_over;
+    return all;
+  }
+  void count(const Frame& frame) {
+    ++(frame.stamp.status == FrameStatus::complete ? own_.delivered : own_.damaged);
+  }
+  void hand_on(const Frame& frame) {
+    count(frame);
+    sink_(frame, counted());
+  }
   [[nodiscard]] bool hangs() const { return calls_.hangs(now()); }
   [[nodiscard]] Error hanging() const {
     return {ErrorKind::device, calls_.words(now()), where(),
@@ -362,6 +383,8 @@ class CameraThread::Worker : public std::enable_shared_from_this<Worker> {
       ++own_.passed_over;
     } else if (frame->stamp.monotonic_time <= wanted_from_) {
       ++passed_unsaid_;
+    } else if (sink_) {
+      hand_on(*frame);
     } else {
       if (waiting_.size() >= options_.queue_frames) drop_oldest();
       waiting_.push_back(std::move(frame));
@@ -398,6 +421,7 @@ class CameraThread::Worker : public std::enable_shared_from_this<Worker> {
   std::condition_variable owner_wakes_;
   std::deque<Order> orders_;
   std::deque<Result<Frame>> waiting_;
+  FrameSink sink_;
   FrameCounts of_camera_;
   FrameCounts own_;
   std::uint64_t passed_unsaid_ =
@@ -439,6 +463,7 @@ void CameraThread::stop() {
 }
 Result<Frame> CameraThread::next_frame(Seconds deadline) { return worker_->next_frame(deadline); }
 std::uint64_t CameraThread::pass_over(TimePoint until) { return worker_->pass_over(until); }
+FrameCounts CameraThread::feed(FrameSink sink) { return worker_->feed(std::move(sink)); }
 Status CameraThread::reset_shutter(TimePoint at) { return worker_->reset(at); }
 Status CameraThread::trim_rate(PartsPerMillion trim) {
   return worker_->call(Task::trim_rate, [trim](Camera& camera) { return camera.trim_rate(trim); });

@@ -34,7 +34,8 @@ struct CameraThreadOptions {
 ///   doesn't hang: the processor is overloaded. If this object is destroyed meanwhile, thread and camera are
 ///   left running; they end if the call ever returns.
 /// reset_shutter() returns at once; frames are skipped until the reset is done, and next_frame returns its
-/// error. Queued frames are in none of the counts. start() and next_frame() update info() when a camera has
+/// error. Queued frames are in none of the counts; those that a sink takes are counted as next_frame() counts
+/// them. start() and next_frame() update info() when a camera has
 /// come back. One owner thread, except state(), overworked(), trouble() and counts(), which any thread may
 /// call. Uses the machine's monotonic clock.
 class CameraThread final : public Camera {
@@ -66,6 +67,10 @@ class CameraThread final : public Camera {
   std::uint64_t pass_over(TimePoint until) override;
   Status reset_shutter(TimePoint at) override;
   Status trim_rate(PartsPerMillion trim) override;
+  /// From now on frames go to `sink`, on the camera's thread, instead of into the queue: those that wait
+  /// there first. An empty sink: into the queue again. Returns the counts at that instant: what is counted as
+  /// delivered or damaged after it went to the sink, and after the next call it goes there no more.
+  FrameCounts feed(FrameSink sink);
 
  private:
   class Worker;

@@ -45,7 +45,7 @@ Conductor::Conductor(const ConductorParts& parts, rig::StopAsked stop, const rig
       overload_(parts.rig.size()),
       flame_(parts.config.alignment.flame),
       ended_(parts.rig.size(), false),
-      trouble_told_(parts.rig.size(), false),
+      trouble_noted_(parts.rig.size()),
       began_(parts.rig.clock().now()) {
   for (drivers::Camera* camera : devices_.cameras) {
     if (ending && ending()) return;

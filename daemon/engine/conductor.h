@@ -151,6 +151,8 @@ class Conductor {
   [[nodiscard]] v1::HostPart running_part() const;
   [[nodiscard]] bool records_for_another() const { return part_ && recorder_; }
   void describe_hosts(v1::DaemonStatus& status) const;
+  void feed_recorder();
+  std::vector<drivers::FrameCounts> stop_feeding();
   void begin_finishing();
   void finish_recording();
   void conclude_recording(v1::RecordingStatus status);
@@ -216,7 +218,7 @@ class Conductor {
   bool phase_lost_ =
       false;  ///< a camera went away while it was recorded: what is known of its shutter is void
 
-  std::unique_ptr<Recorder> recorder_;
+  std::shared_ptr<Recorder> recorder_;  ///< the cameras' sinks hold it too
   /// The job that finishes recorder_: a slow disk takes minutes. While it runs recorder_ is the job's.
   std::shared_ptr<JobHandle> finishing_;
   std::shared_ptr<v1::RecordingStatus> finished_;  ///< what it brings
@@ -232,11 +234,10 @@ class Conductor {
   TimePoint record_began_;
   TimePoint record_ended_;
   std::optional<Seconds> spread_;  ///< between two cameras when it began, as the lock knew it
-  std::optional<TimePoint> last_frame_;
   std::vector<drivers::FrameCounts> counted_before_;  ///< the recording, by camera
   std::optional<TimePoint> live_fed_;
-  std::vector<bool> ended_;         ///< recordings that are replayed have ends
-  std::vector<bool> trouble_told_;  ///< of a camera, since its last frame
+  std::vector<bool> ended_;                                  ///< recordings that are replayed have ends
+  std::vector<std::optional<std::uint64_t>> trouble_noted_;  ///< by camera: after so many frames
   v1::ReconstructRequest reconstruct_request_;
   drivers::StrobeSettings strobe_settings_;
   Status strobe_status_;  ///< of its last answer

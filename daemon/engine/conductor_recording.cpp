@@ -131,14 +131,33 @@ void Conductor::begin_recording() {
   }
   recorder_ = std::move(*recorder);
   record_opening_events(now, lock);
-  last_frame_.reset();
   expired_ = false;
   counted_before_ = own_counts();
+  feed_recorder();
   parts_.loan.hold(part_.has_value());
   if (!parts.empty())
     parts_.hosts.begin(record_folder_, parts, {manifest.hosts().begin(), manifest.hosts().end()});
   if (record_request_.has_live()) parts_.live.start(record_folder_, record_request_.live());
   static_cast<void>(happen(RecordingBegun{}));
+}
+
+/// From now on each camera's thread hands its frames to the recorder itself: whatever holds this thread up
+/// costs no frame.
+void Conductor::feed_recorder() {
+  for (std::size_t i = 0; i < parts_.rig.own(); ++i) {
+    parts_.rig.feed(i, [recorder = recorder_, &loan = parts_.loan, i](const Frame& frame,
+                                                                      const drivers::FrameCounts& counts) {
+      loan.offer(i, frame, counts, kLentWhileRecorded);
+      recorder->take(i, frame);
+    });
+  }
+}
+
+/// Returns what each of this host's cameras counts after the last frame that the recorder took.
+std::vector<drivers::FrameCounts> Conductor::stop_feeding() {
+  std::vector<drivers::FrameCounts> counts;
+  for (std::size_t i = 0; i < parts_.rig.own(); ++i) counts.push_back(parts_.rig.feed(i, {}));
+  return counts;
 }
 
 Status Conductor::check_live(const v1::LiveRequest& request) const {
@@ -223,7 +242,7 @@ bool Conductor::all_have_come() const {
 /// A job: queues drain to the disk, and segments are flushed.
 void Conductor::begin_finishing() {
   finished_ = std::make_shared<v1::RecordingStatus>();
-  const auto finish = [recorder = recorder_.get(), finished = finished_, after = own_counts(),
+  const auto finish = [recorder = recorder_.get(), finished = finished_, after = stop_feeding(),
                        now = parts_.rig.clock().now(), folder = record_folder_,
                        &hosts = parts_.hosts](const Observer& observer) -> JobResult {
     *finished = recorder->finish(after, now, [&](double fraction, std::string_view doing) {
@@ -325,7 +344,7 @@ void Conductor::capture() {
     static_cast<void>(happen(RecordingEnds{TimeOver{Seconds(seconds)}}));
   } else if (std::all_of(ended_.begin(), ended_.end(), [](bool ended) { return ended; })) {
     static_cast<void>(happen(RecordingEnds{Why::replay_over}));
-  } else if (now - last_frame_.value_or(record_began_) > longest_silence()) {
+  } else if (now - recorder_->newest_frame().value_or(record_began_) > longest_silence()) {
     static_cast<void>(happen(RecordingEnds{NoFrames{longest_silence(), silent_cameras()}}));
   }
   if (alignment_ && !expired_ && state_.phase == v1::CAPTURING && alignment_->time_left(now) <= Seconds(0)) {
@@ -358,36 +377,37 @@ Seconds Conductor::longest_silence() const {
   return silence;
 }
 
-/// Takes the frames that are there; of cameras that film only while they are waited for, the next of each.
+/// Takes the frames that are there and no recorder takes; of cameras that film only while they are waited
+/// for, the next of each.
 void Conductor::drain() {
   const bool by_itself = real_time();
   const bool recorded = recorder_ && !finishing_;
   const auto& cameras = devices_.cameras;
   for (std::size_t i = 0; i < cameras.size(); ++i) {
     while (!ended_[i]) {
-      Result<Frame> frame = cameras[i]->next_frame(by_itself ? Seconds(0) : kFrameDeadline);
+      const Result<Frame> frame = cameras[i]->next_frame(by_itself ? Seconds(0) : kFrameDeadline);
       if (!frame.ok()) {
         note_trouble(i, frame.error());
         break;
       }
-      trouble_told_[i] = false;
-      last_frame_ = std::max(last_frame_.value_or(frame->stamp.monotonic_time), frame->stamp.monotonic_time);
-      parts_.loan.offer(i, *frame, cameras[i]->counts(), recorded ? kLentWhileRecorded : Seconds(0));
-      if (recorded && i < parts_.rig.own()) recorder_->take(i, std::move(*frame));
+      if (!recorded || i >= parts_.rig.own())
+        parts_.loan.offer(i, *frame, cameras[i]->counts(), recorded ? kLentWhileRecorded : Seconds(0));
       if (!by_itself) break;
     }
   }
 }
 
-/// A camera that hangs says so each time that it is asked, many times a second: it is told once.
+/// A camera that hangs says so each time that it is asked, many times a second: it is noted once, until a
+/// frame comes.
 void Conductor::note_trouble(std::size_t camera, const Error& error) {
   if (error.kind == ErrorKind::timed_out) return;
   if (error.kind == ErrorKind::out_of_data) {
     ended_[camera] = true;
     return;
   }
-  if (trouble_told_[camera]) return;
-  trouble_told_[camera] = true;
+  const drivers::FrameCounts counts = parts_.rig.counts(camera);
+  const std::uint64_t frames = counts.delivered + counts.damaged;
+  if (std::exchange(trouble_noted_[camera], frames) == frames) return;
   parts_.loan.fail(camera, error);
   parts_.board.notice(v1::AMBER, error.message());
 }

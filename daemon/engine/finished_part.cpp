@@ -28,7 +28,8 @@ std::int64_t find_end(const session::SessionReader& session) {
 }
 
 /// Tells of a part that isn't being recorded any more.
-Result<v1::HostPart> describe_finished_part(const std::filesystem::path& folder, const v1::Manifest& manifest) {
+Result<v1::HostPart> describe_finished_part(const std::filesystem::path& folder,
+                                            const v1::Manifest& manifest) {
   v1::HostPart part;
   part.set_session(folder.filename().string());
   part.set_state(v1::HostPart::RECORDING);

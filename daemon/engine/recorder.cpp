@@ -104,23 +104,45 @@ Recorder::Recorder(session::SessionWriter writer, const RecorderOptions& options
       session_(std::move(session)),
       purpose_(std::move(purpose)),
       began_(now),
-      past_end_(before.size(), false),
       before_(before),
+      past_end_(before.size(), false),
       books_(before.size()) {}
 
-void Recorder::take(std::size_t camera, Frame frame) {
-  CameraBooks& books = books_[camera];
-  const bool past_end = ended_ && frame.stamp.monotonic_time > *ended_;
-  if (past_end) past_end_[camera] = true;
-  if (past_end || frame.stamp.monotonic_time < began_) {
-    ++books.left_out;
-    return;
+void Recorder::take(std::size_t camera, const Frame& frame) {
+  const TimePoint filmed = frame.stamp.monotonic_time;
+  {
+    const std::lock_guard lock(mutex_);
+    newest_ = std::max(newest_.value_or(filmed), filmed);
+    const bool past_end = ended_ && filmed > *ended_;
+    if (past_end) past_end_[camera] = true;
+    if (past_end || filmed < began_) {
+      ++books_[camera].left_out;
+      return;
+    }
+    books_[camera].arrivals.add(frame.stamp.frame_id);
   }
-  books.arrivals.add(frame.stamp.frame_id);
-  if (!writer_.push(camera, std::move(frame))) ++books.dropped;
+  if (writer_.push(camera, frame)) return;
+  const std::lock_guard lock(mutex_);
+  ++books_[camera].dropped;
+}
+
+void Recorder::end(TimePoint at) {
+  const std::lock_guard lock(mutex_);
+  ended_ = at;
+}
+
+bool Recorder::has_all(std::size_t camera) const {
+  const std::lock_guard lock(mutex_);
+  return past_end_[camera];
+}
+
+std::optional<TimePoint> Recorder::newest_frame() const {
+  const std::lock_guard lock(mutex_);
+  return newest_;
 }
 
 std::uint64_t Recorder::no_room() const {
+  const std::lock_guard lock(mutex_);
   std::uint64_t frames = 0;
   for (const CameraBooks& books : books_) frames += books.dropped;
   return frames;
@@ -128,7 +150,7 @@ std::uint64_t Recorder::no_room() const {
 
 RecordedNow Recorder::now() const {
   RecordedNow now;
-  for (std::size_t i = 0; i < books_.size(); ++i) {
+  for (std::size_t i = 0; i < before_.size(); ++i) {
     const session::CameraProgress camera = writer_.progress(i);
     now.safe.push_back(camera.safe);
     now.load.queue_fill = std::max(now.load.queue_fill, camera.queue_fill);
@@ -144,7 +166,7 @@ void Recorder::show_progress(v1::RecordingStatus& status) const {
   status.clear_lost();
   status.clear_camera_progress();
   std::uint64_t bytes = 0;
-  for (std::size_t i = 0; i < books_.size(); ++i) {
+  for (std::size_t i = 0; i < before_.size(); ++i) {
     const session::CameraProgress now = writer_.progress(i);
     *status.add_cameras() = now.counts;
     add(*status.mutable_lost(), now.counts);
@@ -171,7 +193,12 @@ v1::RecordingStatus Recorder::status(TimePoint now) const {
   status.set_session(session_);
   status.set_purpose(purpose_);
   status.set_state(v1::RecordingStatus::RECORDING);
-  const double seconds = std::max((std::min(now, ended_.value_or(now)) - began_).value(), 0.0);
+  TimePoint end = now;
+  {
+    const std::lock_guard lock(mutex_);
+    end = std::min(now, ended_.value_or(now));
+  }
+  const double seconds = std::max((end - began_).value(), 0.0);
   status.set_seconds(seconds);
   show_progress(status);
   if (seconds > 0) status.set_bytes_per_s(static_cast<double>(status.bytes()) / seconds);
@@ -181,9 +208,15 @@ v1::RecordingStatus Recorder::status(TimePoint now) const {
 v1::RecordingStatus Recorder::finish(const std::vector<drivers::FrameCounts>& after, TimePoint now,
                                      const Progress& progress) {
   v1::RecordingStatus status = this->status(now);
-  for (std::size_t i = 0; i < books_.size(); ++i) {
-    books_[i].driver = after[i] - before_[i];
-    const v1::Counts explained = explain(books_[i]);
+  // No more frames come. The lock isn't held while the disk is waited for.
+  std::vector<CameraBooks> all_books;
+  {
+    const std::lock_guard lock(mutex_);
+    all_books = books_;
+  }
+  for (std::size_t i = 0; i < all_books.size(); ++i) {
+    all_books[i].driver = after[i] - before_[i];
+    const v1::Counts explained = explain(all_books[i]);
     writer_.count_lost(i, session::LossCause::transport, explained.transport());
     writer_.count_lost(i, session::LossCause::underrun, explained.underrun());
     writer_.count_lost(i, session::LossCause::passed_over, explained.passed_over());
@@ -203,16 +236,16 @@ v1::RecordingStatus Recorder::finish(const std::vector<drivers::FrameCounts>& af
   status.clear_cameras();
   status.clear_lost();
   std::string disagreements;
-  for (std::size_t i = 0; i < books_.size(); ++i) {
+  for (std::size_t i = 0; i < all_books.size(); ++i) {
     const v1::CameraStream& stream = manifest->cameras(static_cast<int>(i));
     *status.add_cameras() = stream.counts();
     add(*status.mutable_lost(), stream.counts());
-    if (const std::string why = disagreement(books_[i], stream.counts()); !why.empty())
+    if (const std::string why = disagreement(all_books[i], stream.counts()); !why.empty())
       disagreements += fmt::format("{}{}: {}", disagreements.empty() ? "" : "; ", stream.camera_id(), why);
   }
   status.set_frames(status.lost().recorded());
   status.set_state(disagreements.empty() ? v1::RecordingStatus::COMPLETE : v1::RecordingStatus::FAILED);
-  status.set_verdict(disagreements.empty() ? words(status.lost(), books_.size(), load.waits_for_disk())
+  status.set_verdict(disagreements.empty() ? words(status.lost(), all_books.size(), load.waits_for_disk())
                                            : "the counts don't agree: " + disagreements);
   return status;
 }

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <memory>
+#include <mutex>
 #include <optional>
 #include <string>
 #include <vector>
@@ -50,8 +51,8 @@ struct RecordedNow {
   RecordingLoad load;               ///< without what only the devices know
 };
 
-/// One recording in progress: frames in, a session's folder out, and the books on what became of each. One
-/// thread.
+/// One recording in progress: frames in, a session's folder out, and the books on what became of each. Each
+/// camera's frames come on one thread at a time, and end before finish(); any thread may ask.
 class Recorder {
  public:
   /// Of `manifest` the caller fills what SessionWriter::create says. `before` is what the drivers count now,
@@ -62,11 +63,13 @@ class Recorder {
                                                  TimePoint now);
 
   /// Waits only where the options say so. Frames that came before it began or after it ended are left out.
-  void take(std::size_t camera, Frame frame);
+  void take(std::size_t camera, const Frame& frame);
   /// It holds what was filmed until then; frames of that time may still be on their way.
-  void end(TimePoint at) { ended_ = at; }
+  void end(TimePoint at);
   /// Whether a frame has come that this camera filmed after the end.
-  [[nodiscard]] bool has_all(std::size_t camera) const { return past_end_[camera]; }
+  [[nodiscard]] bool has_all(std::size_t camera) const;
+  /// When the newest frame of any camera was filmed; nothing before the first.
+  [[nodiscard]] std::optional<TimePoint> newest_frame() const;
   Status append(const v1::Event& event) { return writer_.append(event); }
   /// What the disk refuses now; writing is tried again.
   [[nodiscard]] std::optional<session::DiskTrouble> trouble() const { return writer_.trouble(); }
@@ -90,9 +93,11 @@ class Recorder {
   std::string session_;
   std::string purpose_;
   TimePoint began_;
+  const std::vector<drivers::FrameCounts> before_;  ///< by camera, what the driver had counted when it began
+  mutable std::mutex mutex_;                        ///< of all below
   std::optional<TimePoint> ended_;
-  std::vector<bool> past_end_;                ///< by camera
-  std::vector<drivers::FrameCounts> before_;  ///< by camera, what the driver had counted when it began
+  std::optional<TimePoint> newest_;
+  std::vector<bool> past_end_;  ///< by camera
   std::vector<CameraBooks> books_;
 };
 

@@ -32,6 +32,7 @@ class ObservedCamera final : public drivers::Camera {
   Result<Frame> next_frame(Seconds deadline) override {
     Result<Frame> frame = camera_.next_frame(deadline);
     if (frame && on_frame_) on_frame_(*frame);
+    if (frame && sink_) sink_(*frame, counts());
     if (!frame && frame.error().kind == ErrorKind::out_of_data) {
       filming_ = false;
       ended_ = true;
@@ -41,10 +42,17 @@ class ObservedCamera final : public drivers::Camera {
   std::uint64_t pass_over(TimePoint until) override { return camera_.pass_over(until); }
   Status reset_shutter(TimePoint at) override { return camera_.reset_shutter(at); }
   Status trim_rate(PartsPerMillion trim) override { return camera_.trim_rate(trim); }
+  /// As drivers::CameraThread::feed(), on the owner's thread: next_frame() hands the frame on, and returns it
+  /// too.
+  drivers::FrameCounts feed(drivers::FrameSink sink) {
+    sink_ = std::move(sink);
+    return counts();
+  }
 
  private:
   drivers::Camera& camera_;
   std::function<void(const Frame&)> on_frame_;
+  drivers::FrameSink sink_;
   bool filming_ = false;
   bool ended_ = false;
 };

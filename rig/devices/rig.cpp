@@ -259,6 +259,11 @@ drivers::CameraThread::State Rig::state(std::size_t index) const {
                                     : drivers::CameraThread::State::idle;
 }
 
+drivers::FrameCounts Rig::feed(std::size_t index, drivers::FrameSink sink) {
+  const Member& member = cameras_.at(index);
+  return member.thread ? member.thread->feed(std::move(sink)) : member.observed->feed(std::move(sink));
+}
+
 std::optional<Error> Rig::trouble(std::size_t index) const {
   const Member& member = cameras_.at(index);
   return member.thread ? member.thread->trouble() : std::nullopt;

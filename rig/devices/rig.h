@@ -92,6 +92,11 @@ class Rig {
     return cameras_.at(index).camera->counts();
   }
 
+  /// Hands this camera's frames to `sink` from now on, until it is fed an empty one
+  /// (drivers::CameraThread::feed): in real time on the camera's thread, else on the thread that waits for
+  /// the next frame.
+  drivers::FrameCounts feed(std::size_t index, drivers::FrameSink sink);
+
   /// Each camera's read-out timing from the configuration; for missing values, from its host's, else from its
   /// picture.
   [[nodiscard]] std::vector<smear::CcdTiming> timing() const;

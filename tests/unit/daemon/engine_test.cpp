@@ -142,6 +142,24 @@ TEST_F(EngineThreads, AStrobeThatIsSilentForLongerThanTheQueuesHoldCostsARecordi
   EXPECT_EQ(stopped->state(), v1::RecordingStatus::COMPLETE) << stopped->verdict();
 }
 
+TEST_F(EngineThreads, AControlThreadThatStandsStillCostsARecordingNoFrame) {
+  config_.rig.virtual_rig.time = rig::VirtualConfig::Time::real;
+  constexpr std::size_t kQueue = 2;
+  test::SmallDaemon daemon(config_, {.queue_frames = kQueue});
+  ASSERT_TRUE(daemon.work_until([&] { return daemon.conductor->status().light() == v1::GREEN; }, 1 << 20));
+  ASSERT_TRUE(daemon.record("take").ok());
+  const auto delivered = [&] { return daemon.rig->counts(0).delivered; };
+  const auto before = delivered();
+  // This is the control thread, and it does nothing else meanwhile.
+  EXPECT_TRUE(wait_until([&] { return delivered() > before + 8 * kQueue; }));
+  ASSERT_TRUE(daemon.conductor->stop_recording().ok());
+  ASSERT_TRUE(daemon.reach(v1::IDLE, 1 << 20));
+  const v1::RecordingStatus recording = daemon.conductor->status().recording();
+  EXPECT_EQ(recording.state(), v1::RecordingStatus::COMPLETE) << recording.verdict();
+  EXPECT_GT(recording.cameras(0).recorded(), 8 * kQueue);
+  for (const v1::Counts& camera : recording.cameras()) EXPECT_EQ(camera.queue(), 0U);
+}
+
 TEST_F(EngineThreads, AJobTellsWhatCameOfIt) {
   left_by_another("old", session::Encoding::ffv1);
   start();

@@ -7,9 +7,11 @@
 #include <deque>
 #include <memory>
 #include <mutex>
+#include <numeric>
 #include <string>
 #include <thread>
 #include <utility>
+#include <vector>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -51,6 +53,10 @@ class Desk {
     const std::lock_guard lock(mutex_);
     if (taken_ == made_) return {};
     return taken_++;
+  }
+  bool all_taken() {
+    const std::lock_guard lock(mutex_);
+    return taken_ == made_;
   }
   std::atomic<bool> computes{false};  ///< next_frame doesn't come to an end for want of a faster processor
   void hang() { set(true); }
@@ -189,6 +195,29 @@ TEST_F(CameraThreads, AFullQueueLosesItsOldestAndCountsThem) {
   ASSERT_TRUE(wait_until([&] { return camera->counts().queue == 6; }));
   for (std::uint64_t id = 6; id < 10; ++id) EXPECT_EQ(camera->next_frame(kHangGuard)->stamp.frame_id, id);
   EXPECT_EQ(camera->counts(), (FrameCounts{.delivered = 4, .queue = 6}));
+}
+
+TEST_F(CameraThreads, ASinkTakesEachFrameOnceAndTheQueueTheOthers) {
+  ASSERT_TRUE(camera->start().ok());
+  std::mutex mutex;
+  std::vector<std::uint64_t> taken;
+  const auto sink = [&](const Frame& frame, const FrameCounts& counts) {
+    const std::lock_guard lock(mutex);
+    taken.push_back(frame.stamp.frame_id);
+    EXPECT_EQ(counts.delivered, taken.size());
+  };
+  desk->make_frames(2);
+  ASSERT_TRUE(wait_until([&] { return desk->all_taken(); }));
+  EXPECT_EQ(camera->feed(sink).delivered, 0U) << "what waits is delivered after that";
+  desk->make_frames(100);  // a queue of four would lose most of them
+  ASSERT_TRUE(wait_until([&] { return camera->counts().delivered == 102; }));
+  EXPECT_EQ(camera->feed({}).delivered, 102U);
+  desk->make_frames(1);
+  EXPECT_EQ(camera->next_frame(kHangGuard)->stamp.frame_id, 102U);
+  std::vector<std::uint64_t> all(102);
+  std::iota(all.begin(), all.end(), 0);
+  EXPECT_EQ(taken, all);
+  EXPECT_EQ(camera->counts(), (FrameCounts{.delivered = 103}));
 }
 
 TEST_F(CameraThreads, ACameraThatWentAwayIsSaidOnceAndFilmsOnWhenItIsBack) {

@@ -227,7 +227,8 @@ Result<std::optional<Frame>> AlignBench::fresh_frame(std::size_t camera) {
     ++taken_[camera];
     reset_ordered_[camera] = false;
     if (rig_.recorder) {
-      EMBERLOCK_RETURN_IF_ERROR(rig_.recorder->write(camera, *frame));
+      static_cast<void>(rig_.recorder->push(camera, *frame));  // it waits for room rather than lose one
+      if (const auto failure = rig_.recorder->failure()) return *failure;
       rig_.recorder->count_lost(camera, session::LossCause::passed_over,
                                 std::exchange(passed_over_[camera], 0));
     }

@@ -9,7 +9,7 @@
 #include "base/progress.h"
 #include "base/result.h"
 #include "rig/align/run.h"
-#include "session/writer.h"
+#include "session/async_writer.h"
 #include "smear_sync/sensors/phase_sensor.h"
 
 namespace emberlock::rig {

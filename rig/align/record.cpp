@@ -101,8 +101,10 @@ Result<AlignRunResult> record_align(const std::filesystem::path& folder, AlignRi
   manifest.set_session_id("alignment-" + manifest.created_utc());
   for (const drivers::Camera* camera : rig.cameras)
     *manifest.add_cameras() = drivers::to_proto(camera->info());
-  EMBERLOCK_ASSIGN_OR_RETURN(session::SessionWriter writer,
+  EMBERLOCK_ASSIGN_OR_RETURN(session::SessionWriter session,
                              session::SessionWriter::create(folder, std::move(manifest)));
+  // Encoded and written on threads of its own. A replay needs every frame.
+  session::AsyncWriter writer(std::move(session), {.when_full = session::WhenFull::wait});
   rig.recorder = &writer;
   v1::Event settings;
   settings.set_monotonic_ns(rig.clock->now().ns);

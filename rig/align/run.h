@@ -12,7 +12,7 @@
 #include "base/result.h"
 #include "drivers/camera.h"
 #include "drivers/strobe.h"
-#include "session/writer.h"
+#include "session/async_writer.h"
 #include "smear_sync/align/align.h"
 #include "smear_sync/align/align_words.h"
 #include "smear_sync/ccd_timing.h"
@@ -26,8 +26,8 @@ struct AlignRig {
   std::vector<drivers::Camera*> cameras;
   drivers::Strobe* strobe = nullptr;
   Clock* clock = nullptr;
-  session::SessionWriter* recorder =
-      nullptr;  ///< takes every frame, strobe setting, reset, trim and decision, if there is one
+  /// Takes every frame, strobe setting, reset, trim and decision, if there is one.
+  session::AsyncWriter* recorder = nullptr;
 };
 
 struct AlignRunOptions {

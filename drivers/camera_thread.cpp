@@ -19,6 +19,7 @@
 #include "base/clock.h"
 #include "base/log.h"
 #include "drivers/call_watch.h"
+#include "drivers/frame_queue.h"
 
 namespace emberlock::drivers {
 namespace {
@@ -46,7 +47,11 @@ std::string_view name(Task task) { return kTasks[static_cast<std::size_t>(task)]
 class CameraThread::Worker : public std::enable_shared_from_this<Worker> {
  public:
   Worker(std::unique_ptr<Camera> camera, CameraThreadOptions options)
-      : options_(std::move(options)), info_(camera->info()), id_(info_.id), camera_(std::move(camera)) {}
+      : options_(std::move(options)),
+        info_(camera->info()),
+        id_(info_.id),
+        camera_(std::move(camera)),
+        queue_(options_.queue_frames) {}
 
   void launch() {
     std::thread([self = shared_from_this()] { self->run(); }).detach();
@@ -82,17 +87,13 @@ class CameraThread::Worker : public std::enable_shared_from_this<Worker> {
 
   FrameCounts counts() const {
     const std::lock_guard lock(mutex_);
-    return counted();
+    return queue_.counts(of_camera_);
   }
 
   FrameCounts feed(FrameSink sink) {
     const std::lock_guard lock(mutex_);
-    const FrameCounts before = counted();
-    sink_ = std::move(sink);
-    if (!sink_) return before;
-    for (const Result<Frame>& waiting : waiting_)
-      if (waiting) hand_on(*waiting);
-    std::erase_if(waiting_, [](const Result<Frame>& waiting) { return waiting.ok(); });
+    const FrameCounts before = queue_.counts(of_camera_);
+    queue_.feed(std::move(sink), of_camera_);
     return before;
   }
 
@@ -156,8 +157,7 @@ class CameraThread::Worker : public std::enable_shared_from_this<Worker> {
     ++film_;
     orders_.clear();
     resets_to_do_ = 0;
-    drop_frames();
-    waiting_.clear();
+    queue_.clear();
     const auto stopped = std::make_shared<bool>(false);
     order(Task::stop, now(), [stopped, this](Camera& camera) {
       camera.stop();
@@ -175,16 +175,11 @@ class CameraThread::Worker : public std::enable_shared_from_this<Worker> {
   Result<Frame> next_frame(Seconds deadline) {
     std::unique_lock lock(mutex_);
     const Time until = after(now(), deadline);
-    while (waiting_.empty() && now() < until && !hangs()) {
+    while (queue_.empty() && now() < until && !hangs()) {
       owner_wakes_.wait_until(lock, calls_.next_look(now(), until));
     }
     adopt_info();
-    if (!waiting_.empty()) {
-      Result<Frame> next = std::move(waiting_.front());
-      waiting_.pop_front();
-      if (next) count(*next);
-      return next;
-    }
+    if (auto next = queue_.take()) return *std::move(next);
     if (hangs()) return hanging();
     if (!filming_) {
       return over_.value_or(Error{ErrorKind::device, "it does not film", where(), "start() it first"});
@@ -198,14 +193,7 @@ class CameraThread::Worker : public std::enable_shared_from_this<Worker> {
 
   std::uint64_t pass_over(TimePoint until) {
     const std::lock_guard lock(mutex_);
-    wanted_from_ = std::max(wanted_from_, until);
-    const auto first_wanted = std::find_if(
-        waiting_.begin(), waiting_.end(),
-        [&](const Result<Frame>& waiting) { return !waiting || waiting->stamp.monotonic_time > until; });
-    passed_unsaid_ += static_cast<std::uint64_t>(first_wanted - waiting_.begin());
-    waiting_.erase(waiting_.begin(), first_wanted);
-    own_.passed_over += passed_unsaid_;
-    return std::exchange(passed_unsaid_, 0);
+    return queue_.pass_over(until);
   }
 
   Status reset(TimePoint at) {
@@ -223,11 +211,11 @@ class CameraThread::Worker : public std::enable_shared_from_this<Worker> {
       const Status status = camera.reset_shutter(at);
       const std::lock_guard inner(mutex_);
       if (film != film_) return;
-      drop_frames();
+      queue_.drop_frames();
       if (resets_to_do_ > 0) --resets_to_do_;
       if (!status) lose(status.error());
     });
-    drop_frames();
+    queue_.drop_frames();
     return {};
   }
 
@@ -241,21 +229,6 @@ class CameraThread::Worker : public std::enable_shared_from_this<Worker> {
   // These require the lock.
 
   [[nodiscard]] std::string where() const { return "camera " + id_; }
-  [[nodiscard]] FrameCounts counted() const {
-    FrameCounts all = of_camera_;
-    all.delivered = own_.delivered;
-    all.damaged = own_.damaged;
-    all.queue += own_.queue;
-    all.passed_over += own_.passed_over;
-    return all;
-  }
-  void count(const Frame& frame) {
-    ++(frame.stamp.status == FrameStatus::complete ? own_.delivered : own_.damaged);
-  }
-  void hand_on(const Frame& frame) {
-    count(frame);
-    sink_(frame, counted());
-  }
   [[nodiscard]] bool hangs() const { return calls_.hangs(now()); }
   [[nodiscard]] Error hanging() const {
     return {ErrorKind::device, calls_.words(now()), where(),
@@ -281,7 +254,7 @@ class CameraThread::Worker : public std::enable_shared_from_this<Worker> {
     lost_by_ = error;
     lost_since_ = now();
     retry_at_ = after(now(), options_.retry);
-    waiting_.push_back(error);
+    queue_.add(error);
     std::erase_if(orders_, [](const Order& order) { return order.task == Task::reset_shutter; });
     resets_to_do_ = 0;
   }
@@ -289,12 +262,6 @@ class CameraThread::Worker : public std::enable_shared_from_this<Worker> {
   void adopt_info() {
     if (learnt_info_) info_ = *std::exchange(learnt_info_, std::nullopt);
   }
-  void drop_frames() {
-    own_.passed_over += static_cast<std::uint64_t>(
-        std::count_if(waiting_.begin(), waiting_.end(), [](const Result<Frame>& r) { return r.ok(); }));
-    std::erase_if(waiting_, [](const Result<Frame>& r) { return r.ok(); });
-  }
-
   /// Calls the camera without holding the lock; state() can then see that it hangs.
   template <class Act>
   auto busy(std::unique_lock<std::mutex>& lock, Task with, Time begins, const Act& act) {
@@ -367,36 +334,15 @@ class CameraThread::Worker : public std::enable_shared_from_this<Worker> {
       if (frame && options_.on_frame) options_.on_frame(*frame);
       return frame;
     });
-    if (next) return add(std::move(next), film);
+    if (next && (resets_to_do_ > 0 || film != film_)) return queue_.pass_over();
+    if (next) return queue_.add(std::move(*next), of_camera_);
     if (film != film_ || next.error().kind == ErrorKind::timed_out) return;
     if (next.error().kind == ErrorKind::device) return lose(next.error());
     if (next.error().kind == ErrorKind::out_of_data) {
       filming_ = false;
       over_ = next.error();
     }
-    // A repeated error is reported once.
-    if (waiting_.empty() || waiting_.back()) waiting_.push_back(std::move(next));
-  }
-
-  void add(Result<Frame> frame, std::uint64_t film) {
-    if (resets_to_do_ > 0 || film != film_) {
-      ++own_.passed_over;
-    } else if (frame->stamp.monotonic_time <= wanted_from_) {
-      ++passed_unsaid_;
-    } else if (sink_) {
-      hand_on(*frame);
-    } else {
-      if (waiting_.size() >= options_.queue_frames) drop_oldest();
-      waiting_.push_back(std::move(frame));
-    }
-  }
-
-  void drop_oldest() {
-    const auto oldest = std::find_if(waiting_.begin(), waiting_.end(),
-                                     [](const Result<Frame>& waiting) { return waiting.ok(); });
-    if (oldest == waiting_.end()) return;
-    waiting_.erase(oldest);
-    ++own_.queue;
+    queue_.add_once(next.error());
   }
 
   void look_for_it(std::unique_lock<std::mutex>& lock) {
@@ -420,13 +366,8 @@ class CameraThread::Worker : public std::enable_shared_from_this<Worker> {
   std::condition_variable thread_wakes_;
   std::condition_variable owner_wakes_;
   std::deque<Order> orders_;
-  std::deque<Result<Frame>> waiting_;
-  FrameSink sink_;
+  FrameQueue queue_;
   FrameCounts of_camera_;
-  FrameCounts own_;
-  std::uint64_t passed_unsaid_ =
-      0;  ///< frames dropped after pass_over() returned; the next call reports them
-  TimePoint wanted_from_;
   int resets_to_do_ = 0;
   std::uint64_t film_ = 0;  ///< number of starts and stops; calls begun before the last one are obsolete
   bool filming_ = false;    ///< as requested by the owner

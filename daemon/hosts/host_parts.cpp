@@ -120,7 +120,7 @@ void HostParts::begin(Part& part, const std::filesystem::path& folder) {
 void HostParts::begin(const std::filesystem::path& folder, const std::vector<v1::PartRequest>& requests,
                       const std::vector<v1::HostPart>& known) {
   const std::lock_guard lock(mutex_);
-  // A host that doesn't answer may still be asked for an earlier take: this thread drains the cameras, so it
+  // A host that doesn't answer may still be asked for an earlier take. The engine's thread calls this, and
   // doesn't wait for that.
   std::erase_if(beginning_, [](const std::future<void>& one) {
     return one.wait_for(std::chrono::seconds(0)) == std::future_status::ready;

@@ -32,7 +32,8 @@ void FrameQueue::add(Frame frame, const FrameCounts& of_camera) {
     return sink_(frame, counts(of_camera));
   }
   if (waiting_.size() >= capacity_) {
-    if (const auto oldest = std::find_if(waiting_.begin(), waiting_.end(), is_frame); oldest != waiting_.end()) {
+    if (const auto oldest = std::find_if(waiting_.begin(), waiting_.end(), is_frame);
+        oldest != waiting_.end()) {
       waiting_.erase(oldest);
       ++own_.queue;
     }
@@ -42,10 +43,9 @@ void FrameQueue::add(Frame frame, const FrameCounts& of_camera) {
 
 std::uint64_t FrameQueue::pass_over(TimePoint until) {
   wanted_from_ = std::max(wanted_from_, until);
-  const auto first_wanted =
-      std::find_if(waiting_.begin(), waiting_.end(), [&](const Result<Frame>& waiting) {
-        return !waiting || waiting->stamp.monotonic_time > until;
-      });
+  const auto first_wanted = std::find_if(waiting_.begin(), waiting_.end(), [&](const Result<Frame>& waiting) {
+    return !waiting || waiting->stamp.monotonic_time > until;
+  });
   passed_unsaid_ += static_cast<std::uint64_t>(first_wanted - waiting_.begin());
   waiting_.erase(waiting_.begin(), first_wanted);
   own_.passed_over += passed_unsaid_;

@@ -422,8 +422,10 @@ TemperatureField temperature_of(const Scene& scene, const Reconstruction& done, 
   read.field.summary.if_other = summed_up(done.volume, std::move(other)).summary.mean;
   if (emitter != Emitter::soot) return with_absorption(asked, emitter, !named.empty(), std::move(read));
   const Dispersion dispersion(Thermometer(table_for(done, response, emitter)), response);
+  // A flame's soot may have any dispersion between the one that is read by and none, each as likely: the
+  // standard uncertainty of a rectangular distribution that ends at what is read (JCGM 100:2008, 4.3.7).
   add_error(read, [&](std::size_t p) {
-    return static_cast<float>(dispersion.at(static_cast<double>(read.field.kelvin[p])));
+    return static_cast<float>(dispersion.at(static_cast<double>(read.field.kelvin[p])) / std::sqrt(3.0));
   });
   TemperatureField field = with_absorption(asked, emitter, !named.empty(), std::move(read));
   field.summary.dispersion = dispersion.at(field.summary.mean);

@@ -48,7 +48,8 @@ struct TemperatureSummary {
   double sigma = 0;                    ///< the median of the voxels' errors
   double chi_square = 0;               ///< mean per degree of freedom, as each was read; 0: there were none
   bool response_given = true;          ///< by the user or the scene; else standard_response() is assumed
-  /// What soot of a constant E(m) would be read too hot by, K at the mean; each error of soot holds it.
+  /// What soot of a constant E(m) would be read too hot by, K at the mean; each error of soot holds it,
+  /// divided by the square root of 3: any dispersion between is as likely.
   double dispersion = 0;
   double if_other = 0;  ///< what the mean were if the glow were soot's instead of grey, or the reverse; as
                         ///< it is read, without a joint solve

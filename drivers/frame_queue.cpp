@@ -24,7 +24,7 @@ void FrameQueue::feed(FrameSink sink, const FrameCounts& of_camera) {
 
 void FrameQueue::add(Frame frame, const FrameCounts& of_camera) {
   if (frame.stamp.monotonic_time <= wanted_from_) {
-    ++passed_unsaid_;
+    ++unreported_;
     return;
   }
   if (sink_) {
@@ -46,10 +46,10 @@ std::uint64_t FrameQueue::pass_over(TimePoint until) {
   const auto first_wanted = std::find_if(waiting_.begin(), waiting_.end(), [&](const Result<Frame>& waiting) {
     return !waiting || waiting->stamp.monotonic_time > until;
   });
-  passed_unsaid_ += static_cast<std::uint64_t>(first_wanted - waiting_.begin());
+  unreported_ += static_cast<std::uint64_t>(first_wanted - waiting_.begin());
   waiting_.erase(waiting_.begin(), first_wanted);
-  own_.passed_over += passed_unsaid_;
-  return std::exchange(passed_unsaid_, 0);
+  own_.passed_over += unreported_;
+  return std::exchange(unreported_, 0);
 }
 
 void FrameQueue::drop_frames() { own_.passed_over += std::erase_if(waiting_, is_frame); }

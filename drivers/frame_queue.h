@@ -26,7 +26,7 @@ class FrameQueue {
   void add_once(const Error& error) {
     if (waiting_.empty() || waiting_.back()) add(error);
   }
-  /// A frame that nobody wants.
+  /// Counts a frame that isn't queued.
   void pass_over() { ++own_.passed_over; }
   /// Drops what was filmed until then, and what comes of it later. Returns how many it dropped since the last
   /// call.
@@ -49,7 +49,7 @@ class FrameQueue {
   FrameSink sink_;
   FrameCounts own_;
   TimePoint wanted_from_;
-  std::uint64_t passed_unsaid_ = 0;  ///< dropped since pass_over() returned
+  std::uint64_t unreported_ = 0;  ///< passed over since pass_over() returned
 };
 
 }  // namespace emberlock::drivers

@@ -79,7 +79,8 @@ class Conductor {
   Status trim_lent(const Borrower& leader, const v1::TrimRequest& request);
   Result<v1::HostPart> record_part(const Borrower& leader, const v1::PartRequest& request);
   Status stop_part(const Borrower& leader, const v1::StopPartRequest& request);
-  /// Hears the leader, and tells of its part of this session where that is being recorded.
+  /// Returns the part of this session that is being recorded for the leader, if one is. Counts as a
+  /// heartbeat.
   Result<std::optional<v1::HostPart>> find_running_part(const Borrower& leader,
                                                         const std::string& session_id);
 

@@ -397,8 +397,7 @@ void Conductor::drain() {
   }
 }
 
-/// A camera that hangs says so each time that it is asked, many times a second: it is noted once, until a
-/// frame comes.
+/// A camera that hangs reports it with each call, many times a second: it is noted once, until a frame comes.
 void Conductor::note_trouble(std::size_t camera, const Error& error) {
   if (error.kind == ErrorKind::timed_out) return;
   if (error.kind == ErrorKind::out_of_data) {

@@ -27,7 +27,7 @@ std::int64_t find_end(const session::SessionReader& session) {
   return until;
 }
 
-/// Tells of a part that isn't being recorded any more.
+/// Describes a part that isn't being recorded any more.
 Result<v1::HostPart> describe_finished_part(const std::filesystem::path& folder,
                                             const v1::Manifest& manifest) {
   v1::HostPart part;

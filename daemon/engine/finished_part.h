@@ -16,7 +16,7 @@ inline constexpr int kMostOfAName = 99;
 /// long.
 std::string name_part(const std::string& name, int n);
 
-/// Finds this host's part of a session that isn't being recorded any more, and tells how much it holds. Reads
+/// Finds this host's part of a session that isn't being recorded any more, and describes what it holds. Reads
 /// the session's manifest and index, so a thread that serves a recording doesn't call it. Error: out_of_data
 /// (there is no such part), or those of the manifest.
 Result<v1::HostPart> find_finished_part(const session::SessionStore& store,

@@ -300,7 +300,7 @@ class Operator {
     test::HttpAnswer answer = call("Capture/Record", wanted);
     while (answer.status == 409 && answer.body.find("ask again") != std::string::npos &&
            Clock::now() < until) {
-      std::this_thread::sleep_for(500ms);
+      soak_.pause(500ms);
       answer = call("Capture/Record", wanted);
     }
     if (answer.status != 200) {

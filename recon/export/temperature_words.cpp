@@ -115,8 +115,8 @@ std::vector<std::string> temperature_words(const TemperatureSummary& t) {
                     t.emitter_told ? "" : ": which of the two isn't told, and each error holds it"));
   if (t.dispersion != 0)
     words.push_back(
-        fmt::format("soot whose E(m) is constant would be read {:.0f} K too {}: each error holds it divided "
-                    "by the root of 3",
+        fmt::format("soot whose E(m) is constant would be read {:.0f} K too {}: each error allows for any "
+                    "dispersion up to that",
                     std::abs(t.dispersion), t.dispersion > 0 ? "hot" : "cold"));
   if (t.joint.left_out)
     words.push_back(
